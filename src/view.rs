@@ -1,42 +1,21 @@
 //! The view of a mission: the full graph filtered, grouped and collapsed; the full graph stays as it is.
 
-mod apart;
-mod audience;
-mod bundles;
 mod caption;
-mod cards;
-mod cluster;
-mod collapse;
-mod counts;
-mod crowds;
-mod filter;
+mod choose;
 mod filtered;
-mod frame;
+mod fold;
 mod frames;
-mod group;
-mod hidden;
-mod home;
-mod homes;
 mod items;
-mod lasting;
-mod lives;
-pub(crate) mod looks;
-mod marks;
-mod names;
+mod listed;
+mod marked;
 pub(crate) mod news;
-mod nothing;
+mod omitted;
 mod options;
-mod replicas;
-mod roles;
 pub(crate) mod runs;
-mod select;
 mod shown;
-mod stable;
 mod state;
+mod steady;
 mod still;
-mod turn;
-pub(crate) mod union;
-pub(crate) mod words;
 
 use std::sync::Arc;
 
@@ -45,25 +24,26 @@ use crate::base::notice::Notices;
 use crate::graph::{ById, Element};
 use crate::mission::Mission;
 
-pub use cards::CardRow;
-pub use collapse::Collapsible;
-pub(crate) use collapse::headlines;
-pub use crowds::Crowd;
-pub use filter::NameFilter;
 pub(crate) use filtered::filtered;
-pub use frame::{Frame, Headline, Phrase};
-pub use lasting::Lasting;
-pub use looks::{Looks, TopicRow};
-pub(crate) use nothing::{none_pass, nothing, unmatched, unmatched_topics};
-pub use options::{Grouping, Hide, Mode, ViewOptions};
+pub use fold::crowded::Crowd;
+pub use fold::namespaces::Collapsible;
+pub(crate) use fold::namespaces::headlines;
+pub use fold::rows::CardRow;
+pub use frames::{Frame, Headline, Phrase};
+pub(crate) use listed::{DrawnPart, drawn_part};
+pub use marked::Lasting;
+pub(crate) use omitted::{none_pass, nothing, unmatched, unmatched_topics};
+pub use options::{Grouping, Hide, Mode, NameFilter, ViewOptions};
+pub(crate) use shown::both;
 use shown::sum;
-pub use shown::{Mark, Members, Shown};
+pub use shown::{Looks, Mark, Members, Shown, TopicRow};
 pub use still::Presence;
+pub(crate) use still::union;
 
 /// The part of a mission that the picture shows, and a notice for everything that it leaves out.
 pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
     let viewed = items::Viewed::new(mission, options);
-    let notices = hidden::notes(&mission.elements, &viewed, options);
+    let notices = omitted::notes(&mission.elements, &viewed, options);
     let frames = frames::frames(mission, options, &viewed);
     let mut view = View {
         compares: mission.log.compares,
@@ -73,7 +53,7 @@ pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
     if is_still && !view.compares {
         view = still::still(view, mission);
     } else if options.is_picture {
-        crowds::gather(&mut view, mission);
+        fold::crowded::gather(&mut view, mission);
     }
     (view, notices)
 }
@@ -84,9 +64,9 @@ pub(crate) fn outline(mission: &Mission, options: &ViewOptions) -> View {
     assembled(viewed, options, frames::Frames::default())
 }
 
-fn assembled(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frames) -> View {
+fn assembled(viewed: items::Viewed<'_>, options: &ViewOptions, frames: frames::Frames) -> View {
     let mut list = frames.list;
-    let mut drawn = cards::Drawn {
+    let mut drawn = fold::rows::Drawn {
         items: viewed.items,
         arrows: viewed.arrows,
         items_shown: frames.items,
@@ -105,7 +85,8 @@ fn assembled(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frame
         Vec::new()
     };
     let fleets = viewed.fleets.all.iter().map(|fleet| &*fleet.name).collect();
-    let mut namespaces = cluster::clusters(&mut drawn.items, options.group.namespaces, &fleets);
+    let mut namespaces =
+        fold::namespaces::clusters(&mut drawn.items, options.group.namespaces, &fleets);
     let mut equal = Vec::new();
     for namespace in &mut namespaces {
         let fleets = viewed.fleets.all.iter().zip(0_usize..);
@@ -119,7 +100,7 @@ fn assembled(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frame
         frame.member_lists = equal.iter().map(member_list).collect();
     }
     View {
-        also: bundles::also_here(in_words, shown_in_words, &namespaces),
+        also: listed::also_here(in_words, shown_in_words, &namespaces),
         rows,
         items: drawn.items,
         arrows: drawn.arrows,

@@ -10,7 +10,7 @@ use super::target::Target;
 use crate::base::error::{Error, Result};
 use crate::draw::paint::raster::Pixels;
 use crate::draw::scene::Scene;
-use crate::view::union::union;
+use crate::view::union;
 use crate::view::{SeenWindow, View};
 
 /// The data that an encoder needs for every frame; each includes the previous ones.

@@ -10,8 +10,8 @@ use crate::draw::timeline::Timeline;
 use crate::export::Output;
 use crate::export::sequence::{Drawings, UnionDrawings};
 use crate::mission::Mission;
-use crate::view::words::{DrawnPart, drawn_part};
 use crate::view::{AlsoHere, View, view};
+use crate::view::{DrawnPart, drawn_part};
 
 /// The part of a screen that the graph of a page has: 3 : 2.
 const SCREEN: Size = Size::new(1200.0, 800.0);

@@ -3,16 +3,15 @@
 use std::collections::BTreeMap;
 use std::mem::discriminant;
 
-use super::audience::Audience;
-use super::home::{home, without_transport};
 use super::items::Viewed;
+use super::marked::Part;
 use super::{Frame, Headline, ItemKind, Lasting, Phrase};
+use crate::base::name::{is_quiet, namespace};
 use crate::base::time::Stamp;
 use crate::base::words;
-use crate::graph::{Element, Elements, NodeId};
+use crate::graph::{Element, Elements, NodeId, TopicId, Wiring};
 use crate::mission::Mission;
 use crate::mission::event_log::{Detail, EventId, EventLog, Kind, Parts};
-use crate::view::lasting::Part;
 
 /// The largest length of a name in characters; longer ones are cut.
 const LONGEST_NAME: usize = 48;
@@ -25,7 +24,7 @@ const CROWDED: [Kind; 4] = [Kind::Appeared, Kind::Vanished, Kind::Silent, Kind::
 /// A writer of headlines, window by window.
 pub(crate) struct CaptionWriter<'a> {
     elements: &'a Elements,
-    viewed: &'a Viewed,
+    viewed: &'a Viewed<'a>,
     log: &'a EventLog,
     /// The parts of each event of the log.
     parts: Parts,
@@ -42,7 +41,7 @@ pub(crate) struct CaptionWriter<'a> {
 type Groups = BTreeMap<(u8, [String; 2]), Phrase>;
 
 impl<'a> CaptionWriter<'a> {
-    pub(crate) fn new(mission: &'a Mission, viewed: &'a Viewed) -> Self {
+    pub(crate) fn new(mission: &'a Mission, viewed: &'a Viewed<'a>) -> Self {
         Self {
             elements: &mission.elements,
             viewed,
@@ -315,7 +314,7 @@ impl<'a> CaptionWriter<'a> {
 
     /// The label of its box; its role if it has no box of its own.
     fn node_name(&self, id: NodeId) -> Option<&'a str> {
-        let item = self.viewed.node.get(id).copied().flatten();
+        let item = self.viewed.item_of(Element::Node(id));
         let item = item.and_then(|at| self.viewed.items.get(at));
         match item.filter(|i| i.kind == ItemKind::Node && !i.is_replica) {
             Some(item) => Some(&item.label),
@@ -384,8 +383,80 @@ fn clip(name: &str) -> String {
     words::shorten(name, LONGEST_NAME).into_owned()
 }
 
+/// The subscribers of topics with one publisher.
+pub(super) struct Audience<'a> {
+    elements: &'a Elements,
+    wiring: Wiring,
+}
+
+impl<'a> Audience<'a> {
+    pub(super) fn new(elements: &'a Elements) -> Self {
+        let wiring = elements.wiring(|_, _| true);
+        Self { elements, wiring }
+    }
+
+    /// Of the topics that only this node (or other runs of it) publishes, the one with most subscribers, and
+    /// these subscribers.
+    pub(super) fn of(&self, node: NodeId) -> Option<(TopicId, &[NodeId])> {
+        let topics = self.wiring.published.get(node)?.iter().copied();
+        let name = |topic: TopicId| self.elements.topics.get(topic).map(|t| &t.name);
+        let role = |id: NodeId| self.elements.nodes.get(id).map(|n| &n.role);
+        let own = topics.filter(|topic| {
+            let is_shown = name(*topic).is_some_and(|name| !is_quiet(name.as_str()));
+            let mut publishers = self.wiring.publishers[*topic].iter();
+            is_shown && publishers.all(|other| role(*other) == role(node))
+        });
+        let missed = own.map(|topic| (topic, &self.wiring.subscribers[topic][..]));
+        let missed = missed.filter(|(_, nodes)| !nodes.is_empty());
+        missed.max_by_key(|(topic, nodes)| (nodes.len(), std::cmp::Reverse(*topic)))
+    }
+}
+
+/// The namespace below which names are written without it: the one around all names that have one, else that
+/// of most of them; empty if all are at the root.
+pub(super) fn home<'n>(names: impl Iterator<Item = &'n str>) -> &'n str {
+    let spaces = names.map(|name| namespace(without_transport(name)));
+    let spaces: Vec<&str> = spaces.filter(|space| *space != "/").collect();
+    let Some(first) = spaces.first() else {
+        return "";
+    };
+    let around = spaces.iter().fold(*first, |a, b| shared(a, b));
+    if !around.is_empty() {
+        return around;
+    }
+    let mut most: BTreeMap<&str, (usize, &str)> = BTreeMap::new();
+    for space in spaces {
+        let end = space[1..].find('/').map_or(space.len(), |at| at + 1);
+        let (count, around) = most.entry(&space[..end]).or_insert((0, space));
+        (*count, *around) = (*count + 1, shared(around, space));
+    }
+    // The first of equal ones.
+    let best = most.values().rev().max_by_key(|(count, _)| *count);
+    best.map_or("", |(_, around)| around)
+}
+
+/// The namespace around two others; empty for the root.
+pub(super) fn shared<'n>(a: &'n str, b: &str) -> &'n str {
+    let mut end = 0;
+    for (x, y) in a.split('/').zip(b.split('/')) {
+        if x != y {
+            break;
+        }
+        end += x.len() + 1;
+    }
+    &a[..end.saturating_sub(1).min(a.len())]
+}
+
+/// The name of an image topic without its transport.
+pub(super) fn without_transport(name: &str) -> &str {
+    const TRANSPORTS: [&str; 3] = ["/compressed", "/compressedDepth", "/theora"];
+    let cut = TRANSPORTS.iter().find_map(|end| name.strip_suffix(end));
+    cut.filter(|rest| !rest.is_empty()).unwrap_or(name)
+}
+
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::view::testing::mission;
     use crate::view::{Frame, Mark, ViewOptions, view};
 
@@ -462,5 +533,14 @@ mod tests {
         let short = frame.fitting(|text| text.chars().count() < 40);
         assert_eq!(short, "− /m stops; + /b, /c, /d, +1 start; +6");
         assert_eq!(frame.fitting(|_| false), "− /m stops; +10");
+    }
+
+    #[test]
+    fn the_namespace_of_most_names_is_left_out() {
+        assert_eq!(home(["/r1/a", "/r1/nav/b", "/c"].into_iter()), "/r1");
+        assert_eq!(home(["/r1/x/a", "/r2/b", "/r2/c"].into_iter()), "/r2");
+        assert_eq!(home(["/a", "/b"].into_iter()), "");
+        assert_eq!(home(["/cam/image/compressed"].into_iter()), "/cam");
+        assert_eq!(shared("/robot1", "/robot10"), "");
     }
 }

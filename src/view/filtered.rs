@@ -1,12 +1,12 @@
 //! The viewed part of a mission as a separate mission, for data files.
 
+use super::ViewOptions;
 use super::items::Viewed;
 use super::state::shows_node;
-use super::{Mode, ViewOptions};
 use crate::graph::diff::Change;
 use crate::graph::history::{Sender, Sending};
 use crate::graph::{
-    ById, Edge, EdgeId, Element, ElementState, Elements, Graph, Id, NodeId, TopicId,
+    ById, Edge, Element, ElementState, Elements, Graph, Id, NodeId, PerElement, TopicId,
 };
 use crate::mission::event_log::{Detail, Event};
 use crate::mission::{EventId, EventLog, Mission, Window};
@@ -31,50 +31,48 @@ pub(crate) fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
     }
 }
 
-/// Per old id, the new one, if its element stays.
-type NewIds<I> = ById<I, Option<I>>;
-
-/// The elements that stay.
+/// The elements and events that stay.
 struct Keep {
-    nodes: NewIds<NodeId>,
-    topics: NewIds<TopicId>,
-    publishes: NewIds<EdgeId>,
-    subscribes: NewIds<EdgeId>,
+    /// Per element, the new one, if it stays.
+    elements: PerElement<Option<Element>>,
     /// Per event of the log, its new index, if it stays.
-    events: NewIds<EventId>,
+    events: ById<EventId, Option<EventId>>,
 }
 
 impl Keep {
-    fn new(elements: &Elements, options: &ViewOptions, viewed: &Viewed) -> Self {
-        let nodes = numbered(viewed.node.iter().map(Option::is_some));
-        let topics = viewed.topic.with_ids().map(|(id, item)| {
-            let is_carried = !viewed.carriers(Element::Topic(id)).is_empty();
-            match options.mode {
-                Mode::Nodes if options.is_bundled => item.is_some() || is_carried,
-                Mode::Nodes => is_carried,
-                Mode::All => item.is_some(),
-            }
+    fn new(elements: &Elements, options: &ViewOptions, viewed: &Viewed<'_>) -> Self {
+        let is_seen = |what: Element| {
+            let is_carried = || what.is_topic() && !viewed.carriers(what).is_empty();
+            viewed.item_of(what).is_some() || options.mode.is_direct() && is_carried()
+        };
+        let mut next = [0; 4];
+        let elements = PerElement::new(elements, |what| {
+            let (node, topic) = elements.ends(what);
+            let is_node = node.is_none_or(|id| is_seen(Element::Node(id)));
+            let is_topic = topic.is_none_or(|id| is_seen(Element::Topic(id)));
+            let (kind, _) = what.place();
+            (is_node && is_topic).then(|| {
+                next[kind] += 1;
+                Element::KINDS[kind](next[kind] - 1)
+            })
         });
-        let topics = numbered(topics);
-        let stays =
-            |e: &Edge| new_id(&nodes, e.node).is_some() && new_id(&topics, e.topic).is_some();
-        Self {
-            publishes: numbered(elements.publishes.iter().map(stays)),
-            subscribes: numbered(elements.subscribes.iter().map(stays)),
-            nodes,
-            topics,
-            events: ById::default(),
-        }
+        let events = ById::default();
+        Self { elements, events }
     }
 
     /// The events about elements that stay. A part of an event that does not stay becomes a separate event.
     fn log(&mut self, all: &EventLog) -> EventLog {
         let stays = |event: &Event| self.element(event.what).is_some();
-        self.events = numbered(all.events.iter().map(stays));
+        let mut next = (0..).map(EventId::of);
+        let new = all
+            .events
+            .iter()
+            .map(|event| stays(event).then(|| next.next()).flatten());
+        self.events = new.collect();
         let events = all.events.iter().filter_map(|event| {
             Some(Event {
                 what: self.element(event.what)?,
-                part_of: event.part_of.and_then(|whole| new_id(&self.events, whole)),
+                part_of: event.part_of.and_then(|whole| self.event(whole)),
                 detail: match &event.detail {
                     Detail::Senders { from, to } => Detail::Senders {
                         from: self.kept_nodes(from),
@@ -101,21 +99,20 @@ impl Keep {
     }
 
     fn kept_nodes(&self, nodes: &[NodeId]) -> Vec<NodeId> {
-        let new = nodes.iter().filter_map(|id| new_id(&self.nodes, *id));
-        new.collect()
+        nodes.iter().filter_map(|id| self.node(*id)).collect()
     }
 
     fn elements(&self, all: &Elements) -> Elements {
         let edge = |edge: &Edge| {
             Some(Edge {
-                node: new_id(&self.nodes, edge.node)?,
-                topic: new_id(&self.topics, edge.topic)?,
+                node: self.node(edge.node)?,
+                topic: self.topic(edge.topic)?,
                 ..edge.clone()
             })
         };
         Elements {
-            nodes: kept(&all.nodes, &self.nodes),
-            topics: kept(&all.topics, &self.topics),
+            nodes: kept(&all.nodes, |id| self.node(id).is_some()),
+            topics: kept(&all.topics, |id| self.topic(id).is_some()),
             publishes: all.publishes.iter().filter_map(edge).collect(),
             subscribes: all.subscribes.iter().filter_map(edge).collect(),
         }
@@ -123,9 +120,8 @@ impl Keep {
 
     fn window(&self, window: &Window) -> Window {
         let reported = window.changes.iter().zip(&window.events);
-        let kept = reported.filter_map(|(change, event)| {
-            Some((self.change(change)?, new_id(&self.events, *event)?))
-        });
+        let kept = reported
+            .filter_map(|(change, event)| Some((self.change(change)?, self.event(*event)?)));
         let (changes, events) = kept.unzip();
         Window {
             changes,
@@ -134,14 +130,14 @@ impl Keep {
         }
     }
 
-    fn graph(&self, graph: &Graph, options: &ViewOptions, viewed: &Viewed) -> Graph {
+    fn graph(&self, graph: &Graph, options: &ViewOptions, viewed: &Viewed<'_>) -> Graph {
         let is_shown = |state: &ElementState| match state.what {
             Element::Node(_) => shows_node(state.state, options),
             Element::Topic(_) | Element::Publish(_) | Element::Subscribe(_) => true,
         };
         let is_there = |what: Element| graph.get(what).is_some_and(is_shown);
         let states = graph.states.iter().filter_map(|state| {
-            let (node, topic) = viewed.ends_of(state.what);
+            let (node, topic) = viewed.elements.ends(state.what);
             let ends = node.map(Element::Node).into_iter();
             let mut ends = ends.chain(topic.map(Element::Topic));
             let stays = is_shown(state) && ends.all(is_there);
@@ -158,11 +154,11 @@ impl Keep {
 
     fn sending(&self, all: &Sending) -> Sending {
         let senders = all.senders.iter().filter_map(|sender| {
-            let node = sender.node.map(|id| new_id(&self.nodes, id));
+            let node = sender.node.and_then(|id| self.node(id));
             Some(Sender {
-                topic: new_id(&self.topics, sender.topic)?,
+                topic: self.topic(sender.topic)?,
                 // The messages of an omitted node stay, with an unknown sender.
-                node: node.flatten(),
+                node,
                 ..sender.clone()
             })
         });
@@ -170,7 +166,7 @@ impl Keep {
         senders.sort_by_key(|sender| (sender.topic, sender.node));
         Sending {
             senders,
-            pauses: kept(&all.pauses, &self.topics),
+            pauses: kept(&all.pauses, |id| self.topic(id).is_some()),
         }
     }
 
@@ -182,46 +178,47 @@ impl Keep {
             | Change::Rate { what, .. }
             | Change::Value { what, .. } => *what = self.element(*what)?,
             Change::HandedOver { topic, from, to } => {
-                *topic = new_id(&self.topics, *topic)?;
+                *topic = self.topic(*topic)?;
                 (*from, *to) = (self.kept_nodes(from), self.kept_nodes(to));
             }
-            Change::Restarted { node, .. } => *node = new_id(&self.nodes, *node)?,
+            Change::Restarted { node, .. } => *node = self.node(*node)?,
         }
         Some(change)
     }
 
     fn element(&self, element: Element) -> Option<Element> {
-        Some(match element {
-            Element::Node(id) => Element::Node(new_id(&self.nodes, id)?),
-            Element::Topic(id) => Element::Topic(new_id(&self.topics, id)?),
-            Element::Publish(id) => Element::Publish(new_id(&self.publishes, id)?),
-            Element::Subscribe(id) => Element::Subscribe(new_id(&self.subscribes, id)?),
-        })
+        self.elements.of(element).copied().flatten()
+    }
+
+    fn node(&self, id: NodeId) -> Option<NodeId> {
+        match self.element(Element::Node(id))? {
+            Element::Node(id) => Some(id),
+            _ => None,
+        }
+    }
+
+    fn topic(&self, id: TopicId) -> Option<TopicId> {
+        match self.element(Element::Topic(id))? {
+            Element::Topic(id) => Some(id),
+            _ => None,
+        }
+    }
+
+    fn event(&self, id: EventId) -> Option<EventId> {
+        self.events.get(id).copied().flatten()
     }
 }
 
-/// New ids, counted from 0 in the old order, for the elements that stay.
-fn numbered<I: Id>(stays: impl Iterator<Item = bool>) -> NewIds<I> {
-    let mut next = (0..).map(I::of);
-    stays
-        .map(|stays| stays.then(|| next.next()).flatten())
-        .collect()
-}
-
-fn new_id<I: Id>(ids: &NewIds<I>, id: I) -> Option<I> {
-    ids.get(id).copied().flatten()
-}
-
-fn kept<I: Id, T: Clone>(all: &ById<I, T>, ids: &NewIds<I>) -> ById<I, T> {
-    let kept = all.iter().zip(ids).filter(|(_, id)| id.is_some());
-    kept.map(|(one, _)| one.clone()).collect()
+fn kept<I: Id, T: Clone>(all: &ById<I, T>, stays: impl Fn(I) -> bool) -> ById<I, T> {
+    let kept = all.with_ids().filter(|(id, _)| stays(*id));
+    kept.map(|(_, one)| one.clone()).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::view::testing::{mission, text};
-    use crate::view::{Hide, NameFilter};
+    use crate::view::{Hide, Mode, NameFilter};
 
     #[test]
     fn hidden_elements_lose_their_edges_and_changes() {

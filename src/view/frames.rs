@@ -1,19 +1,16 @@
-//! The windows one after the other, each with the headlines of the event log in it.
+//! The windows of the picture one after the other, each with its events, their numbers and the words of its headline.
 
-use super::bundles::beginning;
 use super::caption::CaptionWriter;
 use super::items::Viewed;
-use super::lasting::LastingEvents;
-use super::lives::{Alive, ItemTurns};
-use super::looks::{Looks, LooksWriter};
-use super::marks::WindowMarks;
-use super::stable::{Lengths, stable};
-use super::state::{LivingItems, Now};
-use super::turn::{WindowTurn, marked, with_ends};
-use super::{ArrowId, Counts, Frame, ItemId, MemberState, Shown, ViewOptions};
+use super::listed::beginning;
+use super::marked::{LastingEvents, WindowChanges, WindowMarks};
+use super::shown::{Looks, LooksWriter};
+use super::state::{Alive, ItemTurns, LivingItems, Now};
+use super::steady::{Lengths, stable};
+use super::{ArrowId, Counts, Crowd, ItemId, Lasting, Mark, MemberState, Shown, ViewOptions};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{ById, Element, Id};
-use crate::mission::event_log::Parts;
+use crate::mission::event_log::{EventId, Kind, Parts};
 use crate::mission::{Mission, Window};
 
 /// The windows, and the looks of each item and arrow in them.
@@ -26,27 +23,27 @@ pub(crate) struct Frames {
 
 /// The windows one after the other. In windows without headlines, only elements whose numbers changed are
 /// updated.
-pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) -> Frames {
+pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed<'_>) -> Frames {
     let mut windows = ShownWindows::new(mission, options, viewed);
     let mut writer = CaptionWriter::new(mission, viewed);
     let mut walk = mission.graphs.walk();
     let mut list = Vec::with_capacity(mission.windows.len());
-    let turns = turns(mission);
-    for ((at, window), has_turn) in (0..).zip(&mission.windows).zip(turns) {
+    let changing = changing(mission);
+    for ((at, window), is_changing) in (0..).zip(&mission.windows).zip(changing) {
         walk.next(|what, row| windows.apply(what, row));
         let hides = windows.now.hides_the_silent() && windows.is_touched();
-        if has_turn || hides || windows.now.is_other_length(window.span) {
-            windows.turn(at, window);
+        if is_changing || hides || windows.now.is_other_length(window.span) {
+            windows.change(at, window);
         } else {
             windows.go_on(at);
         }
-        let headlines = std::mem::take(&mut windows.turn.changed.headlines);
+        let headlines = std::mem::take(&mut windows.changes.marks.headlines);
         let mut frame = Frame {
             partial: window.partial,
             messages: window.messages,
             counts: Counts::of(&headlines),
             headlines,
-            lasting: windows.turn.changed.lasting.clone(),
+            lasting: windows.changes.marks.lasting.clone(),
             member_lists: windows.member_lists.clone(),
             ..Frame::empty(window.index, window.span)
         };
@@ -83,36 +80,34 @@ fn join_empty(frames: &mut [Frame]) {
 
 /// For each window, whether it is the first, contains the first message of a topic, or an event of the log
 /// begins or ends in it or in the previous one; in all others nothing changes.
-fn turns(mission: &Mission) -> Vec<bool> {
+fn changing(mission: &Mission) -> Vec<bool> {
     let windows = &mission.windows;
-    let mut turns = vec![false; windows.len()];
+    let mut changing = vec![false; windows.len()];
     let events = mission.log.events.iter();
     let times = events.flat_map(|event| [Some(event.time), event.until]);
     let first = mission.elements.topics.iter().map(|topic| topic.seen.first);
     for time in times.chain(first).flatten() {
         let from = windows.partition_point(|w| w.span.end <= time);
         let to = windows.partition_point(|w| w.span.start <= time) + 1;
-        for turn in turns.iter_mut().take(to).skip(from) {
-            *turn = true;
-        }
+        changing[from..to.min(windows.len())].fill(true);
     }
-    if let Some(first) = turns.first_mut() {
+    if let Some(first) = changing.first_mut() {
         *first = true;
     }
-    turns
+    changing
 }
 
 /// The picture so far, built window by window.
 struct ShownWindows<'a> {
     mission: &'a Mission,
-    viewed: &'a Viewed,
+    viewed: &'a Viewed<'a>,
     lives: ItemTurns<'a>,
     parts: Parts,
     lasting: LastingEvents<'a>,
     /// A beginning before this time is not a change.
     beginning: Option<Stamp>,
     now: Now<'a>,
-    turn: WindowTurn,
+    changes: WindowChanges,
     member_lists: Vec<Vec<MemberState>>,
     items: LooksSoFar<ItemId>,
     arrows: LooksSoFar<ArrowId>,
@@ -165,7 +160,7 @@ impl<I: Id> LooksSoFar<I> {
 }
 
 impl<'a> ShownWindows<'a> {
-    fn new(mission: &'a Mission, options: &'a ViewOptions, viewed: &'a Viewed) -> Self {
+    fn new(mission: &'a Mission, options: &'a ViewOptions, viewed: &'a Viewed<'a>) -> Self {
         Self {
             mission,
             viewed,
@@ -174,7 +169,7 @@ impl<'a> ShownWindows<'a> {
             lasting: LastingEvents::new(&mission.log, viewed),
             beginning: beginning(mission),
             now: Now::new(mission, options, viewed),
-            turn: WindowTurn::default(),
+            changes: WindowChanges::default(),
             member_lists: Vec::new(),
             items: LooksSoFar::new(&viewed.items),
             arrows: LooksSoFar::new(&viewed.arrows),
@@ -197,16 +192,16 @@ impl<'a> ShownWindows<'a> {
     }
 
     /// Shows a window with headlines, or the first after one with headlines.
-    fn turn(&mut self, at: u32, window: &Window) {
+    fn change(&mut self, at: u32, window: &Window) {
         let span = window.span;
         let alive = self.lives.during(span);
         let paused = self.lives.paused(span, &alive);
         let (before, after) = (self.lives.before(span.start), self.lives.before(span.end));
         self.now.live(span, alive, paused);
-        self.turn = WindowTurn {
+        self.changes = WindowChanges {
             before: LivingItems::of(self.viewed, &before),
             after: LivingItems::of(self.viewed, &after),
-            changed: WindowMarks::new(
+            marks: WindowMarks::new(
                 &self.mission.log,
                 (&self.parts, self.beginning),
                 (span, self.lasting.at(span)),
@@ -216,13 +211,28 @@ impl<'a> ShownWindows<'a> {
         self.member_lists = member_lists(self.viewed, &before, &after, window.index == 0);
         self.items.take_touched();
         self.arrows.take_touched();
-        let items = self.turn.items(self.viewed, &self.now);
-        for id in self.viewed.arrows.ids() {
-            let shown = self.turn.arrow(self.viewed, &self.now, &items, id);
+        let (changes, now) = (&self.changes, (self.viewed, &self.now));
+        let there = |id| (changes.before.items[id], changes.after.items[id]);
+        let items = self.viewed.items.ids();
+        let items = items.map(|id| changes.item(now, id, there(id)));
+        let items: ById<ItemId, Option<Shown>> = items.collect();
+        for (id, arrow) in self.viewed.arrows.with_ids() {
+            let mut shown = None;
+            if let (Some(from), Some(to)) = (&items[arrow.from], &items[arrow.to]) {
+                // A node that restarts keeps its arrows, even if it is away when the window ends.
+                let is_back = |end: &Shown| matches!(end.mark, Some(Mark::Restarted | Mark::Away));
+                let is_kept = is_back(from) || is_back(to);
+                let there = (
+                    changes.before.arrows[id],
+                    changes.after.arrows[id] || is_kept,
+                );
+                let ends = [from, to].map(|end| Some((end.mark, &end.events[..])));
+                shown = changes.arrow(now, id, there, ends);
+            }
             self.arrows.show(at, id, shown);
         }
         for (id, shown) in self.viewed.items.ids().zip(items) {
-            self.items.show(at, id, shown.marked);
+            self.items.show(at, id, shown);
         }
     }
 
@@ -234,36 +244,25 @@ impl<'a> ShownWindows<'a> {
                 MemberState::Left | MemberState::Away => MemberState::Away,
             };
         }
+        let (changes, now) = (&self.changes, (self.viewed, &self.now));
+        let (after, stays) = (&changes.after, (true, true));
         for id in self.items.take_touched() {
-            let is_there = self.turn.after.items[id];
-            let shown = is_there.then(|| self.now.item(id)).flatten();
-            let reported = self.turn.changed.items.get(&id);
-            let shown = shown.and_then(|shown| marked(shown, (true, true), reported));
-            self.items.show(at, id, shown);
+            let shown = after.items[id].then(|| changes.item(now, id, stays));
+            self.items.show(at, id, shown.flatten());
         }
         for id in self.arrows.take_touched() {
-            let arrow = &self.viewed.arrows[id];
-            let is_item = |id: ItemId| self.turn.after.items[id];
-            let ends = is_item(arrow.from) && is_item(arrow.to);
-            let is_there = ends && self.turn.after.arrows[id];
-            let shown = is_there.then(|| self.now.arrow(id)).flatten();
-            let shown = shown.and_then(|shown| {
-                let changed = &self.turn.changed;
-                let ends = [arrow.from, arrow.to].map(|id| changed.items.get(&id));
-                let ends = ends
-                    .map(|reported| reported.map(|reported| (reported.mark, &reported.events[..])));
-                let reported = changed.arrows.get(&id).cloned();
-                let reported = reported.or_else(|| with_ends((true, true), ends));
-                marked(shown, (true, true), reported.as_ref())
-            });
-            self.arrows.show(at, id, shown);
+            let ends = [self.viewed.arrows[id].from, self.viewed.arrows[id].to];
+            let is_there = after.arrows[id] && ends.iter().all(|end| after.items[*end]);
+            let marks = ends.map(|id| Some(changes.marks.items.get(&id)?.as_end()));
+            let shown = is_there.then(|| changes.arrow(now, id, stays, marks));
+            self.arrows.show(at, id, shown.flatten());
         }
     }
 }
 
 /// The presence of each member of each fleet, given the elements that exist before and after the window.
 fn member_lists(
-    viewed: &Viewed,
+    viewed: &Viewed<'_>,
     before: &Alive,
     after: &Alive,
     is_first: bool,
@@ -284,11 +283,241 @@ fn member_lists(
         .collect()
 }
 
+/// An event of the log that begins in a window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Headline {
+    /// Its index in the event log.
+    pub event: EventId,
+    /// The kind of event.
+    pub kind: Kind,
+    /// The element it is about.
+    pub what: Element,
+    /// The time of the event.
+    pub time: Stamp,
+}
+
+impl Headline {
+    /// The start of a node.
+    #[cfg(test)]
+    pub(crate) fn started() -> Self {
+        Self {
+            event: EventId(0),
+            kind: Kind::Started,
+            what: Element::Node(crate::graph::NodeId(0)),
+            time: Stamp(0),
+        }
+    }
+}
+
+/// Elements with the same change in a window: `+ planner, costmap start`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Phrase {
+    /// `+` for a beginning, `−` for an end, a space for everything else.
+    pub sign: char,
+    /// The words before the names: `controller subscribes to`.
+    pub lead: String,
+    /// The names.
+    pub names: Vec<String>,
+    /// The events of each name: indices in the event log.
+    pub events: Vec<Vec<EventId>>,
+    /// The words after the names: `start`.
+    pub tail: String,
+}
+
+impl Phrase {
+    /// The phrase with at most `most` names, the rest counted: `+ planner, costmap, +2 start`.
+    fn text(&self, most: usize) -> String {
+        let mut names = self.names.iter().take(most).cloned().collect::<Vec<_>>();
+        let rest = self.names.len() - names.len();
+        if rest > 0 {
+            names.push(format!("+{rest}"));
+        }
+        let sign = match self.sign {
+            ' ' => String::new(),
+            sign => sign.to_string(),
+        };
+        let parts = [&sign, &self.lead, &names.join(", "), &self.tail];
+        let parts = parts.into_iter().filter(|part| !part.is_empty());
+        parts.cloned().collect::<Vec<_>>().join(" ")
+    }
+}
+
+/// One window of the picture; the items and arrows in it are in [`View::seen`](super::View::seen).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Frame {
+    /// The window's index, counted from 0.
+    pub index: usize,
+    /// Its time.
+    pub span: Span,
+    /// Whether it is shorter than the others.
+    pub partial: bool,
+    /// The number of all messages in the window, including those of hidden topics.
+    pub messages: u64,
+    /// For each namespace that represents several, in the order of [`View::namespaces`](super::View::namespaces), the
+    /// presence of each of them.
+    pub member_lists: Vec<Vec<MemberState>>,
+    /// The events that begin in it, in the order of the event log. Headline, marks and timeline are all made from these.
+    pub headlines: Vec<Headline>,
+    /// The events of earlier windows that last into it or end in it: they are marked and in the headline, but
+    /// counted only where they begin.
+    pub lasting: Vec<Lasting>,
+    /// The number of headlines of each kind.
+    pub counts: Counts,
+    /// The changes in words, the most important first; empty exactly if nothing is marked.
+    pub caption: Vec<Phrase>,
+    /// The changes that are combined into one coloured frame, because there are too many.
+    pub crowds: Vec<Crowd>,
+    /// The long time without messages and changes that it lies in, which is one frame of an animation.
+    pub empty: Option<Span>,
+    /// The line below: namespace, exact times and consequences of the changes, or the time of the last
+    /// change.
+    pub note: String,
+}
+
+impl Frame {
+    /// A window without messages and headlines.
+    pub fn empty(index: usize, span: Span) -> Self {
+        Self {
+            index,
+            span,
+            ..Self::default()
+        }
+    }
+
+    /// Whether an event begins or ends in it.
+    pub fn is_changed(&self) -> bool {
+        !self.headlines.is_empty() || self.lasting.iter().any(|l| l.ended.is_some())
+    }
+
+    /// The time that its drawing shows.
+    pub fn shown(&self) -> Span {
+        self.empty.unwrap_or(self.span)
+    }
+
+    /// The events that it reports: the ids of those that begin in it, and of those that last.
+    pub fn events(&self) -> impl Iterator<Item = EventId> {
+        let lasting = self.lasting.iter().map(|l| l.event);
+        self.headlines.iter().map(|h| h.event).chain(lasting)
+    }
+
+    /// The caption in at most `most` phrases of three names each, the rest counted: `− a stops; + b starts; +3`.
+    pub fn words(&self, most: usize) -> String {
+        self.shortened(most, 3)
+    }
+
+    /// The caption with as many names as fit, at most 40 of each kind, and as many phrases as possible; the
+    /// shortest form if none fits.
+    pub fn fitting(&self, fits: impl Fn(&str) -> bool) -> String {
+        let longest = self.caption.iter().map(|p| p.names.len()).max();
+        let longest = longest.unwrap_or(1).min(40);
+        let mut best = (0, self.shortened(1, 1));
+        for phrases in (1..=self.caption.len()).rev() {
+            for names in (1..=longest).rev() {
+                let reported = self.caption.iter().take(phrases);
+                let reported: usize = reported.map(|p| p.names.len().min(names)).sum();
+                if reported <= best.0 {
+                    break;
+                }
+                let text = self.shortened(phrases, names);
+                if fits(&text) {
+                    best = (reported, text);
+                    break;
+                }
+            }
+        }
+        best.1
+    }
+
+    fn shortened(&self, phrases: usize, names: usize) -> String {
+        let reported = self.caption.iter().take(phrases).map(|p| p.text(names));
+        let mut reported: Vec<String> = reported.collect();
+        let rest = self.caption.iter().skip(phrases).map(|p| p.names.len());
+        let rest: usize = rest.sum();
+        if rest > 0 {
+            reported.push(format!("+{rest}"));
+        }
+        reported.join("; ")
+    }
+}
+
+impl Counts {
+    /// The number of headlines of each kind.
+    pub(crate) fn of<'a>(headlines: impl IntoIterator<Item = &'a Headline>) -> Self {
+        let mut counts = Self::default();
+        for headline in headlines {
+            *counts.slot(headline.kind, headline.what) += 1;
+        }
+        counts
+    }
+
+    fn slot(&mut self, kind: Kind, what: Element) -> &mut usize {
+        let is_topic = what.is_topic();
+        match kind {
+            Kind::Started => &mut self.nodes_added,
+            Kind::Stopped => &mut self.nodes_removed,
+            Kind::Restarted => &mut self.restarted,
+            Kind::Silent => &mut self.silent,
+            Kind::Appeared if is_topic => &mut self.topics_added,
+            Kind::Appeared => &mut self.edges_added,
+            Kind::Vanished if is_topic => &mut self.topics_removed,
+            Kind::Vanished => &mut self.edges_removed,
+            Kind::HandedOver => &mut self.handed_over,
+            Kind::Rate => &mut self.rates,
+            Kind::Lifecycle
+            | Kind::Type
+            | Kind::Qos
+            | Kind::Starved
+            | Kind::Duplicate
+            | Kind::Lost => &mut self.values,
+        }
+    }
+
+    /// The number of all headlines.
+    pub fn total(&self) -> usize {
+        self.came() + self.went() + self.changed()
+    }
+
+    /// The number of beginnings.
+    pub fn came(&self) -> usize {
+        self.nodes_added + self.topics_added + self.edges_added
+    }
+
+    /// The number of ends.
+    pub fn went(&self) -> usize {
+        self.nodes_removed + self.topics_removed + self.edges_removed
+    }
+
+    /// The number of changes other than beginnings and ends.
+    pub fn changed(&self) -> usize {
+        self.restarted + self.silent + self.handed_over + self.rates + self.values
+    }
+}
+
+impl std::ops::Add for Counts {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            nodes_added: self.nodes_added + other.nodes_added,
+            nodes_removed: self.nodes_removed + other.nodes_removed,
+            topics_added: self.topics_added + other.topics_added,
+            topics_removed: self.topics_removed + other.topics_removed,
+            edges_added: self.edges_added + other.edges_added,
+            edges_removed: self.edges_removed + other.edges_removed,
+            restarted: self.restarted + other.restarted,
+            silent: self.silent + other.silent,
+            handed_over: self.handed_over + other.handed_over,
+            rates: self.rates + other.rates,
+            values: self.values + other.values,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::{Grouping, Hide, ItemKind, Mark, Mode, View, view};
     use super::*;
     use crate::view::testing::mission;
+    use crate::view::{Grouping, Hide, ItemKind, Mark, Mode, View, view};
 
     /// Each window as text: items and arrows with a sign for their mark; hidden and absent ones are not
     /// listed.

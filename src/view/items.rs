@@ -3,20 +3,18 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::bundles;
-use super::group::{Groups, groups};
-use super::homes::{Boxes, ItemKey};
-use super::names::is_debug_label;
-use super::replicas::Fleets;
-use super::roles;
-use super::select::{Selection, finish, select};
-use super::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Mode, ViewOptions};
-use crate::graph::{ById, Edge, EdgeId, Element, Elements, Id as _, NodeId, PerElement, TopicId};
+use super::choose::{Selection, finish, is_debug_label, select};
+use super::fold::equal::Fleets;
+use super::fold::topics::{self, Groups};
+use super::fold::{Boxes, ItemKey, roles};
+use super::listed::{self, Words};
+use super::{Arrow, ArrowId, ArrowKind, Grouping, Item, ItemId, ItemKind, Mode, ViewOptions};
+use crate::graph::{ById, Edge, EdgeId, Element, Elements, Id as _, PerElement, TopicId};
 use crate::mission::Mission;
 
-/// The part of the picture that shows an edge of the graph.
+/// The part of the picture that shows an element of the graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum EdgePlace {
+pub(crate) enum Place {
     /// It is not drawn.
     Hidden,
     /// It is this item, or part of it.
@@ -28,39 +26,26 @@ pub(crate) enum EdgePlace {
 }
 
 /// Every box and arrow, and the mapping from the graph's elements to them.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Viewed {
+#[derive(Clone, Debug)]
+pub(crate) struct Viewed<'a> {
+    pub(crate) elements: &'a Elements,
     pub(crate) selection: Selection,
     /// Equal namespaces that are drawn as one.
     pub(crate) fleets: Fleets,
     pub(crate) items: ById<ItemId, Item>,
     pub(crate) arrows: ById<ArrowId, Arrow>,
-    /// Per node of the mission, its item.
-    pub(crate) node: ById<NodeId, Option<ItemId>>,
-    /// Per topic of the mission, its item.
-    pub(crate) topic: ById<TopicId, Option<ItemId>>,
-    /// The part that shows each publication. In mode *nodes* a publication may be part of several arrows,
-    /// which only `pairs` lists.
-    pub(crate) publish: ById<EdgeId, EdgePlace>,
-    /// The part that shows each subscription.
-    pub(crate) subscribe: ById<EdgeId, EdgePlace>,
+    /// The part that shows each element. In mode *nodes* an edge may be part of several arrows, which only `pairs` lists.
+    places: PerElement<Place>,
     /// Per arrow from node to node, the publications and subscriptions that it joins.
     pub(crate) pairs: ById<ArrowId, Vec<(EdgeId, EdgeId)>>,
     /// Per topic of the mission, its name in a bundle: that of its group, if it is in one.
     pub(crate) bundled: ById<TopicId, Arc<str>>,
-    /// Node and topic of each publication.
-    pub(crate) published: ById<EdgeId, (NodeId, TopicId)>,
-    /// Node and topic of each subscription.
-    pub(crate) subscribed: ById<EdgeId, (NodeId, TopicId)>,
     /// Per edge, and per topic with publications, the arrows that carry it; those of a topic from its publishers.
     carriers: PerElement<Vec<ArrowId>>,
-    /// Per topic, whether bundles draw it.
-    pub(super) drawn: ById<TopicId, bool>,
+    /// Per topic, whether lines are drawn for it.
+    drawn: ById<TopicId, bool>,
     /// The number of items at the end of the list that are listed as words, because no line leads to them.
     pub(crate) in_words: usize,
-    /// Whether each node is in one of these, and each topic.
-    pub(super) nodes_in_words: ById<NodeId, bool>,
-    pub(super) topics_in_words: ById<TopicId, bool>,
     /// The number of arrows from node to node that were left out because they were too many.
     pub(crate) dropped: usize,
 }
@@ -71,67 +56,63 @@ const MOST_PAIRS: usize = 200_000;
 
 /// The fleets to draw as one: none if exact names or separate boxes are requested.
 fn fleets(elements: &Elements, options: &ViewOptions) -> Fleets {
-    if options.exact_names || options.group == super::Grouping::NONE {
+    if options.exact_names || options.group == Grouping::NONE {
         return Fleets::default();
     }
     Fleets::new(elements, options)
 }
 
-pub(super) type ArrowEnds = (ItemId, ItemId, ArrowKind);
+/// The boxes that an arrow connects, and its kind: edges with the same ends are in one arrow.
+type ArrowEnds = (ItemId, ItemId, ArrowKind);
 
-impl Viewed {
-    pub(crate) fn new(mission: &Mission, options: &ViewOptions) -> Self {
+impl<'a> Viewed<'a> {
+    pub(crate) fn new(mission: &'a Mission, options: &ViewOptions) -> Self {
         let elements = &mission.elements;
         let mut selection = select(elements, options);
         let grouping = match options.mode {
-            Mode::Nodes if !options.is_bundled => super::Grouping::NONE,
+            Mode::Nodes if !options.is_bundled => Grouping::NONE,
             _ => options.group,
         };
         let seen: ById<TopicId, bool> = selection.topics.iter().map(Option::is_none).collect();
-        let groups = groups(elements, &seen, grouping);
+        let groups = topics::groups(elements, &seen, grouping);
         let mut grouped = ById::like(&elements.topics, false);
         for id in groups.values().flatten() {
             grouped[*id] = true;
         }
         finish(&mut selection, elements, options, &grouped);
-        let pair = |edge: &Edge| (edge.node, edge.topic);
         let mut viewed = Self {
+            elements,
             selection,
             fleets: fleets(elements, options),
-            published: elements.publishes.iter().map(pair).collect(),
-            subscribed: elements.subscribes.iter().map(pair).collect(),
-            ..Self::default()
+            items: ById::default(),
+            arrows: ById::default(),
+            places: PerElement::new(elements, |_| Place::Hidden),
+            pairs: ById::default(),
+            bundled: ById::default(),
+            carriers: PerElement::new(elements, |_| Vec::new()),
+            drawn: if options.is_bundled {
+                listed::drawn(mission, options)
+            } else {
+                ById::like(&elements.topics, true)
+            },
+            in_words: 0,
+            dropped: 0,
         };
-        viewed.drawn = ById::like(&elements.topics, true);
-        viewed.nodes_in_words = ById::like(&elements.nodes, false);
-        if options.is_bundled {
-            viewed.drawn = bundles::drawn(mission, options);
-        }
-        // Outputs that are files of data or can be expanded have a box for each.
-        if options.is_bundled && options.is_picture {
-            viewed.nodes_in_words = bundles::nodes_in_words(
-                mission,
-                (&viewed.selection, &viewed.drawn),
-                options.are_leaves_in_words,
-            );
-        }
         viewed.set_items(mission, options, &groups);
         if options.mode.is_direct() {
-            viewed.bundled = bundles::names(elements, &groups);
-            viewed.set_direct(elements, options);
-            if options.is_bundled {
-                viewed.set_leaves(elements);
-            }
-        } else {
-            viewed.set_arrows(elements);
+            viewed.bundled = topics::on_lines(elements, &groups);
+            viewed.set_direct(options);
         }
-        viewed.set_carriers(elements);
+        if !options.mode.is_direct() || options.is_bundled {
+            viewed.set_arrows(options);
+        }
+        viewed.set_carriers();
         viewed
     }
 
     fn set_items(&mut self, mission: &Mission, options: &ViewOptions, groups: &Groups) {
-        let elements = &mission.elements;
-        let (nodes, mut topics) = Boxes {
+        let elements = self.elements;
+        let mut keys = Boxes {
             elements,
             options,
             fleets: &self.fleets,
@@ -139,124 +120,133 @@ impl Viewed {
             groups,
         }
         .keys();
-        self.topics_in_words = ById::like(&topics, false);
-        if options.is_picture {
-            self.set_apart(mission, options, (&nodes, &mut topics));
-        }
-        let own = nodes.with_ids().map(|(id, key)| (key, Element::Node(id)));
-        let others = topics.with_ids().map(|(id, key)| (key, Element::Topic(id)));
-        let shown = own.chain(others);
-        let shown = shown.filter_map(|(key, what)| Some((key.as_ref()?, what)));
+        let words = Words::new(mission, options, (&self.selection, &self.drawn), &mut keys);
+        let shown = keys.iter();
+        let shown = shown.filter_map(|(what, key)| Some((key.as_ref()?, what)));
         let is_in_words = |members: &[(&ItemKey, Element)]| {
-            let is = |(key, what): &(&ItemKey, Element)| match what {
-                _ if key.0 == ItemKind::Namespace => false,
-                Element::Node(id) => self.nodes_in_words[*id],
-                Element::Topic(id) => self.topics_in_words[*id],
-                Element::Publish(_) | Element::Subscribe(_) => false,
+            let is = |(key, what): &(&ItemKey, Element)| {
+                key.kind != ItemKind::Namespace && words.has(*what)
             };
             members.iter().all(is)
         };
         let shown = sorted(shown.collect());
         let (boxes, in_words): (Vec<_>, Vec<_>) = together(&shown).partition(|m| !is_in_words(m));
         self.in_words = in_words.len();
-        self.node = ById::like(&elements.nodes, None);
-        self.topic = ById::like(&elements.topics, None);
         for members in boxes.into_iter().chain(in_words) {
-            let (kind, name) = members[0].0;
+            let ItemKey { kind, name } = members[0].0;
             let id = self.items.push(Item {
                 kind: *kind,
                 name: Arc::clone(name),
                 label: Arc::clone(name),
-                is_replica: *kind != ItemKind::Namespace && self.fleets.of(name).is_some(),
+                is_replica: *kind != ItemKind::Namespace && self.fleets.has(name),
                 is_service: members.iter().all(|(_, what)| elements.is_service(*what)),
                 cluster: None,
                 members: members.iter().map(|(_, what)| *what).collect(),
             });
             for (_, what) in members {
-                match what {
-                    Element::Node(node) => self.node[*node] = Some(id),
-                    Element::Topic(topic) => self.topic[*topic] = Some(id),
-                    Element::Publish(_) | Element::Subscribe(_) => {}
-                }
+                self.set_place(*what, Place::Item(id));
             }
         }
         if !options.exact_names {
             roles::label(&mut self.items, elements);
-            roles::label_unknown(&mut self.items, elements);
         }
     }
 
-    fn set_arrows(&mut self, elements: &Elements) {
-        self.publish = ById::like(&elements.publishes, EdgePlace::Hidden);
-        self.subscribe = ById::like(&elements.subscribes, EdgePlace::Hidden);
+    /// Arrows between nodes and topics; in bundles, only those of topics with a box of their own and the only box that they
+    /// are connected to.
+    fn set_arrows(&mut self, options: &ViewOptions) {
         let mut lines = Vec::new();
-        for (what, edge) in elements.edges() {
-            match self.ends(edge) {
-                None => {}
-                Some((node, topic)) if node == topic => {
-                    self.set_place(what, EdgePlace::Inside(node));
-                }
-                Some((node, topic)) if matches!(what, Element::Publish(_)) => {
-                    lines.push(((node, topic, ArrowKind::Publish), what));
-                }
-                Some((node, topic)) => lines.push(((topic, node, ArrowKind::Subscribe), what)),
+        for (what, edge) in self.elements.edges() {
+            let Some((node, topic)) = self.ends(edge) else {
+                continue;
+            };
+            let is_leaf = self.items[topic].kind == ItemKind::Topic
+                && self.is_drawn(node)
+                && self.is_drawn(topic);
+            if options.mode.is_direct() && !is_leaf {
+                continue;
+            }
+            if node == topic {
+                self.set_place(what, Place::Inside(node));
+            } else if matches!(what, Element::Publish(_)) {
+                lines.push(((node, topic, ArrowKind::Publish), what));
+            } else {
+                lines.push(((topic, node, ArrowKind::Subscribe), what));
             }
         }
         for members in together(&sorted(lines)) {
             let all = members.iter().map(|(_, what)| *what).collect();
-            let id = self.arrows.push(arrow(elements, members[0].0.clone(), all));
+            let arrow = self.arrow(members[0].0.clone(), all);
+            let id = self.arrows.push(arrow);
             for (_, what) in members {
-                self.set_place(*what, EdgePlace::Arrow(id));
+                self.set_place(*what, Place::Arrow(id));
             }
         }
     }
 
-    fn set_place(&mut self, edge: Element, place: EdgePlace) {
-        match edge {
-            Element::Publish(id) => self.publish[id] = place,
-            Element::Subscribe(id) => self.subscribe[id] = place,
-            Element::Node(_) | Element::Topic(_) => {}
+    fn arrow(&self, (from, to, kind): ArrowEnds, members: Vec<Element>) -> Arrow {
+        let is_service = |what: &Element| self.elements.is_service(*what);
+        Arrow {
+            from,
+            to,
+            kind,
+            is_service: members.iter().all(is_service),
+            members,
+            topics: Vec::new(),
+        }
+    }
+
+    fn set_place(&mut self, what: Element, place: Place) {
+        if let Some(old) = self.places.of_mut(what) {
+            *old = place;
+        }
+    }
+
+    /// The part that shows an element.
+    pub(crate) fn place(&self, what: Element) -> Place {
+        self.places.of(what).copied().unwrap_or(Place::Hidden)
+    }
+
+    /// The item of a node or topic.
+    pub(crate) fn item_of(&self, what: Element) -> Option<ItemId> {
+        match self.place(what) {
+            Place::Item(id) => Some(id),
+            _ => None,
         }
     }
 
     /// The items of an edge's node and topic.
-    pub(super) fn ends(&self, edge: &Edge) -> Option<(ItemId, ItemId)> {
-        Some((self.item_of_node(edge.node)?, self.topic[edge.topic]?))
-    }
-
-    fn item_of_node(&self, node: NodeId) -> Option<ItemId> {
-        self.node.get(node).copied().flatten()
+    fn ends(&self, edge: &Edge) -> Option<(ItemId, ItemId)> {
+        let node = self.item_of(Element::Node(edge.node))?;
+        Some((node, self.item_of(Element::Topic(edge.topic))?))
     }
 
     /// Arrows from publishers to subscribers: one per topic between two of them, or one for all topics in a bundle.
-    fn set_direct(&mut self, elements: &Elements, options: &ViewOptions) {
-        let is_bundled = options.is_bundled;
+    fn set_direct(&mut self, options: &ViewOptions) {
+        let (elements, is_bundled) = (self.elements, options.is_bundled);
         let mut subscribers = ById::like(&elements.topics, Vec::new());
         for (id, edge) in elements.subscribes.with_ids() {
-            if let Some(item) = self.item_of_node(edge.node) {
+            if let Some(item) = self.item_of(Element::Node(edge.node)) {
                 subscribers[edge.topic].push((id, item));
             }
         }
         let mut arrows: BTreeMap<ArrowEnds, Vec<(EdgeId, EdgeId)>> = BTreeMap::new();
         let mut pairs = 0;
-        self.publish = ById::like(&elements.publishes, EdgePlace::Hidden);
-        self.subscribe = ById::like(&elements.subscribes, EdgePlace::Hidden);
         for (publish, edge) in elements.publishes.with_ids() {
-            let Some(from) = self.item_of_node(edge.node) else {
+            let Some(from) = self.item_of(Element::Node(edge.node)) else {
                 continue;
             };
-            let topic = &elements.topics[edge.topic];
-            let name = topic.name.as_str();
+            let name = &elements.topics[edge.topic].name;
             if self.selection.topics[edge.topic].is_some()
                 || !self.drawn[edge.topic]
-                || options.hide.debug && is_debug_label(name)
+                || options.hide.debug && is_debug_label(name.as_str())
             {
                 continue;
             }
             for (subscribe, to) in &subscribers[edge.topic] {
-                if from == *to && self.is_namespace(from) {
-                    self.publish[publish] = EdgePlace::Inside(from);
-                    self.subscribe[*subscribe] = EdgePlace::Inside(from);
+                if from == *to && self.items[from].kind == ItemKind::Namespace {
+                    self.set_place(Element::Publish(publish), Place::Inside(from));
+                    self.set_place(Element::Subscribe(*subscribe), Place::Inside(from));
                     continue;
                 }
                 if !self.is_drawn(from) || !self.is_drawn(*to) {
@@ -266,64 +256,57 @@ impl Viewed {
                 if pairs > MOST_PAIRS || is_bundled && from == *to {
                     continue;
                 }
-                let kind = if is_bundled {
-                    ArrowKind::Bundle
-                } else {
-                    ArrowKind::Direct(topic.name.shared())
-                };
-                // One line for both directions.
                 let ends = if is_bundled {
-                    (from.min(*to), from.max(*to))
+                    // One line for both directions.
+                    (from.min(*to), from.max(*to), ArrowKind::Bundle)
                 } else {
-                    (from, *to)
+                    (from, *to, ArrowKind::Direct(name.shared()))
                 };
-                let ends = (ends.0, ends.1, kind);
                 arrows.entry(ends).or_default().push((publish, *subscribe));
             }
         }
         self.dropped = pairs.saturating_sub(MOST_PAIRS);
         for (mut ends, pairs) in arrows {
+            let mut names = BTreeSet::new();
             if is_bundled {
-                self.turn(&mut ends, &pairs);
+                let [there, back] = [ends.0, ends.1].map(|from| self.names_from(from, &pairs));
+                // Most of its topics go along it.
+                if back.len() > there.len() {
+                    (ends.0, ends.1) = (ends.1, ends.0);
+                }
+                names = there;
+                names.extend(back);
             }
             let publishes = pairs.iter().map(|(p, _)| Element::Publish(*p));
             let others = pairs.iter().map(|(_, s)| Element::Subscribe(*s));
             let members: BTreeSet<Element> = publishes.chain(others).collect();
-            let mut arrow = arrow(elements, ends, members.into_iter().collect());
-            if is_bundled {
-                let topics = pairs
-                    .iter()
-                    .map(|(_, s)| &self.bundled[self.subscribed[*s].1]);
-                let topics: BTreeSet<&Arc<str>> = topics.collect();
-                arrow.topics = topics.into_iter().cloned().collect();
-            }
-            self.arrows.push(arrow);
+            self.arrows.push(Arrow {
+                topics: names.into_iter().collect(),
+                ..self.arrow(ends, members.into_iter().collect())
+            });
             self.pairs.push(pairs);
         }
     }
 
-    /// Gives a bundle the direction of most of its topics.
-    fn turn(&self, ends: &mut ArrowEnds, pairs: &[(EdgeId, EdgeId)]) {
-        let topics = |from: ItemId| {
-            let of = pairs
-                .iter()
-                .filter(|(p, _)| self.item_of_sender(*p) == Some(from));
-            let topics = of.map(|(p, _)| &self.bundled[self.published[*p].1]);
-            topics.collect::<BTreeSet<_>>().len()
-        };
-        if topics(ends.1) > topics(ends.0) {
-            (ends.0, ends.1) = (ends.1, ends.0);
-        }
+    /// The names of the topics that an item publishes on a line.
+    fn names_from(&self, from: ItemId, pairs: &[(EdgeId, EdgeId)]) -> BTreeSet<Arc<str>> {
+        let own = pairs.iter().map(|(publish, _)| *publish);
+        let own = own.filter(|publish| self.item_of_sender(*publish) == Some(from));
+        let topics = own.map(|publish| self.elements.publishes[publish].topic);
+        topics
+            .map(|topic| Arc::clone(&self.bundled[topic]))
+            .collect()
     }
 
     /// Whether an item has a box.
-    pub(super) fn is_drawn(&self, item: ItemId) -> bool {
+    fn is_drawn(&self, item: ItemId) -> bool {
         item.at() < self.items.len() - self.in_words
     }
 
     /// The item of the node that publishes.
     fn item_of_sender(&self, publish: EdgeId) -> Option<ItemId> {
-        self.item_of_node(self.published.get(publish)?.0)
+        let edge = self.elements.publishes.get(publish)?;
+        self.item_of(Element::Node(edge.node))
     }
 
     /// The topic of a bundle that a pair of edges is part of, and whether it runs against the arrow.
@@ -332,35 +315,19 @@ impl Viewed {
         arrow: &Arrow,
         (publish, subscribe): (EdgeId, EdgeId),
     ) -> Option<(u32, usize)> {
-        let topic = self.subscribed.get(subscribe)?.1;
+        let topic = self.elements.subscribes.get(subscribe)?.topic;
         let name = self.bundled.get(topic)?;
         let at = arrow.topics.binary_search(name).ok()?;
         let is_back = self.item_of_sender(publish) != Some(arrow.from);
         Some((u32::try_from(at).ok()?, usize::from(is_back)))
     }
 
-    /// The node and the topic of an element: both of an edge, one of the others.
-    pub(crate) fn ends_of(&self, what: Element) -> (Option<NodeId>, Option<TopicId>) {
-        match what {
-            Element::Node(id) => (Some(id), None),
-            Element::Topic(id) => (None, Some(id)),
-            Element::Publish(id) => self.published.get(id).copied().unzip(),
-            Element::Subscribe(id) => self.subscribed.get(id).copied().unzip(),
-        }
-    }
-
-    /// The topic of an element: that of an edge, or itself.
-    pub(crate) fn topic_of(&self, what: Element) -> Option<TopicId> {
-        self.ends_of(what).1
-    }
-
     /// Records the arrows that each topic's publications are part of.
-    fn set_carriers(&mut self, elements: &Elements) {
-        self.carriers = PerElement::new(elements, |_| Vec::new());
+    fn set_carriers(&mut self) {
         for (id, arrow) in self.arrows.with_ids() {
             for member in &arrow.members {
                 let topic = match member {
-                    Element::Publish(publish) => Some(self.published[*publish].1),
+                    Element::Publish(publish) => Some(self.elements.publishes[*publish].topic),
                     _ => None,
                 };
                 for what in [Some(*member), topic.map(Element::Topic)] {
@@ -380,7 +347,7 @@ impl Viewed {
     /// Whether the picture shows this or a box that it is part of. Elements that a filter leaves out are not reported
     /// either.
     pub(crate) fn sees(&self, what: Element) -> bool {
-        let (node, topic) = self.ends_of(what);
+        let (node, topic) = self.elements.ends(what);
         let is_node = node.is_none_or(|id| self.selection.nodes.get(id) == Some(&None));
         let is_topic = topic.is_none_or(|id| self.selection.topics.get(id) == Some(&None));
         (node.is_some() || topic.is_some()) && is_node && is_topic
@@ -389,11 +356,6 @@ impl Viewed {
     /// Whether a single arrow carries a topic from its publishers.
     pub(crate) fn has_single_sender(&self, topic: Element) -> bool {
         self.carriers(topic).len() == 1
-    }
-
-    fn is_namespace(&self, item: ItemId) -> bool {
-        let item = self.items.get(item);
-        item.is_some_and(|item| item.kind == ItemKind::Namespace)
     }
 }
 
@@ -406,19 +368,4 @@ fn sorted<K: Ord>(mut shown: Vec<(K, Element)>) -> Vec<(K, Element)> {
 /// The elements of each item or arrow.
 fn together<K: Eq>(shown: &[(K, Element)]) -> impl Iterator<Item = &[(K, Element)]> {
     shown.chunk_by(|a, b| a.0 == b.0)
-}
-
-pub(super) fn arrow(
-    elements: &Elements,
-    (from, to, kind): ArrowEnds,
-    members: Vec<Element>,
-) -> Arrow {
-    Arrow {
-        from,
-        to,
-        kind,
-        is_service: members.iter().all(|what| elements.is_service(*what)),
-        members,
-        topics: Vec::new(),
-    }
 }

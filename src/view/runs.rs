@@ -6,12 +6,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Serialize, Serializer};
 
-use crate::base::cast;
+use super::{Arrow, Looks, Mark, Shown, TopicRow, View};
 use crate::base::runs::Runs;
-use crate::base::words;
+use crate::base::{cast, words};
 use crate::evidence::Confidence;
 use crate::graph::State;
-use crate::view::{Arrow, Looks, Mark, Shown, TopicRow, View};
 
 /// The values of one item or arrow over the windows (indices into [`View::frames`]); before its first run a list has
 /// value 0.

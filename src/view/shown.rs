@@ -1,8 +1,10 @@
-//! The look of an item or arrow in one window: its state, its change, its numbers.
+//! The look of an item or arrow: its state, change and numbers in one window, and those of all windows in little memory.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::{ArrowId, Counts, ItemId, TopicRow};
+use super::{ArrowId, Counts, ItemId};
+use crate::base::runs::Runs;
 use crate::evidence::Confidence;
 use crate::graph::State;
 use crate::mission::event_log::EventId;
@@ -127,18 +129,6 @@ pub struct Members {
     pub topics: usize,
 }
 
-impl Shown {
-    /// The item that looks like this.
-    pub fn item(&self) -> ItemId {
-        ItemId(self.id)
-    }
-
-    /// The arrow that looks like this.
-    pub fn arrow(&self) -> ArrowId {
-        ArrowId(self.id)
-    }
-}
-
 impl Members {
     /// The number written in the box: of its nodes, or of its topics if it has no nodes; `None` if it is not
     /// a collapsed namespace.
@@ -152,6 +142,16 @@ impl Members {
 }
 
 impl Shown {
+    /// The item that looks like this.
+    pub fn item(&self) -> ItemId {
+        ItemId(self.id)
+    }
+
+    /// The arrow that looks like this.
+    pub fn arrow(&self) -> ArrowId {
+        ArrowId(self.id)
+    }
+
     /// An element about which nothing else is known.
     pub fn plain(id: u32, state: State, confidence: Confidence) -> Self {
         Self {
@@ -160,6 +160,17 @@ impl Shown {
             confidence,
             ..Self::default()
         }
+    }
+
+    /// Adds another element of the same item or arrow: the most active state and the strongest confidence are kept, rates
+    /// and counts are summed.
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.is_paused &= other.is_paused;
+        self.is_starved &= other.is_starved;
+        self.state = self.state.min(other.state);
+        self.confidence = self.confidence.min(other.confidence);
+        self.hz = sum(self.hz, other.hz, |a, b| a + b);
+        self.count = sum(self.count, other.count, u64::saturating_add);
     }
 
     /// The rate that is written, and its number of messages, as far as they are known.
@@ -191,5 +202,317 @@ impl Shown {
                 .then(a.topic.cmp(&b.topic))
         });
         rows.into_iter()
+    }
+}
+
+/// A topic on a line between two boxes in a window, or several that are shown as one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TopicRow {
+    /// Its index in `Arrow::topics`.
+    pub topic: u32,
+    /// Whether its messages run along the arrow, and whether they run against it.
+    pub ways: [bool; 2],
+    /// Whether it is a service.
+    pub is_service: bool,
+    /// Whether the subscriber receives nothing because the qualities of service are incompatible.
+    pub is_starved: bool,
+    /// Its state.
+    pub state: State,
+    /// Messages per second in the window, if known.
+    pub hz: Option<f64>,
+    /// The number of messages in the window, if known.
+    pub count: Option<u64>,
+    /// Its change, if different from that of the whole line.
+    pub mark: Option<Mark>,
+    /// Messages per second before and after, if its rate changed.
+    pub rates: Option<(f64, f64)>,
+}
+
+/// The properties that distinguish unmarked topics of a bundle.
+pub(super) type RowKey = (u32, [bool; 2], bool, State, [Option<u64>; 2]);
+
+impl TopicRow {
+    /// An unmarked topic that looks like this.
+    pub(crate) fn of(topic: u32, ways: [bool; 2], shown: &Shown) -> Self {
+        Self {
+            topic,
+            ways,
+            is_service: false,
+            is_starved: shown.is_starved,
+            state: shown.state,
+            hz: shown.hz,
+            count: shown.count,
+            mark: None,
+            rates: None,
+        }
+    }
+
+    /// Adds the same topic on another line; messages of different senders are summed.
+    pub(crate) fn join(&mut self, other: &Self, is_other_sender: bool) {
+        let is_sum = is_other_sender && self.count.is_some() && other.count.is_some();
+        if is_sum {
+            self.hz = sum(self.hz, other.hz, |a, b| a + b);
+            self.count = sum(self.count, other.count, |a, b| a + b);
+        } else {
+            self.hz = sum(self.hz, other.hz, f64::max);
+            self.count = sum(self.count, other.count, u64::max);
+        }
+        self.state = self.state.min(other.state);
+        self.ways = [0, 1].map(|way| self.ways[way] || other.ways[way]);
+    }
+
+    pub(super) fn key(&self) -> RowKey {
+        (
+            self.topic,
+            self.ways,
+            self.is_starved,
+            self.state,
+            [self.hz.map(f64::to_bits), self.count],
+        )
+    }
+}
+
+/// The looks of one item or arrow, window by window.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Looks {
+    /// Each look only once unless it is marked.
+    distinct: Vec<Shown>,
+    /// The index of the look, or [`AWAY`].
+    runs: Runs<u32>,
+}
+
+/// The index that means absence.
+const AWAY: u32 = u32::MAX;
+
+impl Looks {
+    /// The look in a window; `None` if it is absent.
+    pub fn at(&self, window: usize) -> Option<&Shown> {
+        let look = self.runs.at(u32::try_from(window).unwrap_or(u32::MAX))?;
+        self.distinct.get(look as usize)
+    }
+
+    /// Every look that it ever has, in no particular order.
+    pub fn distinct(&self) -> &[Shown] {
+        &self.distinct
+    }
+
+    /// Its looks with the window from which each applies, in order; `None` if it is absent, as before the
+    /// first of these.
+    pub fn runs(&self) -> impl DoubleEndedIterator<Item = (u32, Option<&Shown>)> + Clone {
+        let look = |place: u32| self.distinct.get(place as usize);
+        let runs = self.runs.0.iter();
+        runs.map(move |(window, place)| (*window, look(*place)))
+    }
+
+    /// Sets the id of all its looks.
+    pub(super) fn renumber(&mut self, id: u32) {
+        for look in &mut self.distinct {
+            look.id = id;
+        }
+    }
+
+    /// Its looks in order, each with its first window, the first window after it, and its index; the last applies to the
+    /// end of all `windows`.
+    pub(super) fn spans(&self, windows: u32) -> impl Iterator<Item = (u32, u32, u32, &Shown)> {
+        let look = |(from, to, place)| Some((from, to, place, self.distinct.get(place as usize)?));
+        self.runs.spans(windows).filter_map(look)
+    }
+
+    /// The looks made by `look` in the windows in which one of `all` changes.
+    pub(crate) fn made_of<'a>(
+        all: impl Iterator<Item = &'a Self>,
+        look: impl Fn(usize) -> Option<Shown>,
+    ) -> Self {
+        let windows: BTreeSet<u32> = all.flat_map(Self::runs).map(|run| run.0).collect();
+        let mut writer = LooksWriter::default();
+        for window in windows {
+            writer.show(window, look(window as usize));
+        }
+        writer.finish()
+    }
+
+    /// The looks in the windows of a sequence, one event per window.
+    pub fn of<'a>(windows: impl IntoIterator<Item = Option<&'a Shown>>) -> Self {
+        let mut writer = LooksWriter::default();
+        for (window, shown) in (0..).zip(windows) {
+            writer.show(window, shown.cloned());
+        }
+        writer.finish()
+    }
+}
+
+/// A writer that adds looks in order of the windows.
+#[derive(Debug, Default)]
+pub(super) struct LooksWriter {
+    looks: Looks,
+    /// The indices of looks without a mark, if there are more than [`FEW`] looks.
+    places: BTreeMap<LookKey, u32>,
+}
+
+/// The number of looks that are searched one by one: most items have no more, and a map for each would take
+/// more memory than everything else.
+const FEW: usize = 4;
+
+/// The properties that distinguish looks without marks.
+type LookKey = (
+    (State, Confidence, bool, bool),
+    [Option<u64>; 5],
+    (usize, Members),
+    Vec<RowKey>,
+    Option<Arc<str>>,
+);
+
+impl LooksWriter {
+    /// Adds the look from this window on; `None` if it is absent.
+    pub(super) fn show(&mut self, window: u32, shown: Option<Shown>) {
+        let place = shown.map_or(AWAY, |shown| self.look(shown));
+        self.turn(window, place);
+    }
+
+    /// The index of a look. A look with a mark gets a new index each time.
+    pub(super) fn look(&mut self, shown: Shown) -> u32 {
+        let is_plain = shown.mark.is_none();
+        if is_plain && let Some(place) = self.place(&shown) {
+            return place;
+        }
+        let all = &mut self.looks.distinct;
+        let next = u32::try_from(all.len()).unwrap_or(AWAY - 1);
+        if all.is_empty() {
+            all.reserve_exact(1);
+        }
+        if is_plain && all.len() > FEW {
+            self.places.insert(key(&shown), next);
+        }
+        all.push(shown);
+        next
+    }
+
+    /// The index of a look without a mark, if it exists already.
+    fn place(&mut self, shown: &Shown) -> Option<u32> {
+        let wanted = key(shown);
+        let all = (0..).zip(&self.looks.distinct);
+        let mut plain = all.filter(|(_, look)| look.mark.is_none());
+        if self.looks.distinct.len() <= FEW {
+            let found = plain.find(|(_, look)| key(look) == wanted);
+            return found.map(|(place, _)| place);
+        }
+        if self.places.is_empty() {
+            let places = plain.map(|(place, look)| (key(look), place));
+            self.places = places.collect();
+        }
+        self.places.get(&wanted).copied()
+    }
+
+    /// Adds the index of the look from this window on.
+    pub(super) fn turn(&mut self, window: u32, place: u32) {
+        self.looks.runs.push(window, place, AWAY);
+    }
+
+    pub(super) fn finish(mut self) -> Looks {
+        self.looks.runs.0.shrink_to_fit();
+        self.looks.distinct.shrink_to_fit();
+        self.looks
+    }
+}
+
+fn key(shown: &Shown) -> LookKey {
+    let bits = |hz: Option<f64>| hz.map(f64::to_bits);
+    let written = (shown.held.map(|held| held.0), shown.held.and_then(|h| h.1));
+    (
+        (
+            shown.state,
+            shown.confidence,
+            shown.is_paused,
+            shown.is_starved,
+        ),
+        [
+            bits(shown.hz),
+            bits(shown.steady_hz),
+            shown.count,
+            bits(written.0),
+            written.1,
+        ],
+        (shown.each, shown.members),
+        shown.topics.iter().map(TopicRow::key).collect(),
+        shown.lifecycle.clone(),
+    )
+}
+
+/// The windows in which one of two looks differs from the previous window, with both looks.
+pub(crate) fn both<'a>(
+    a: &'a Looks,
+    b: &'a Looks,
+) -> impl Iterator<Item = (Option<&'a Shown>, Option<&'a Shown>)> {
+    let (mut next_a, mut next_b) = (a.runs().peekable(), b.runs().peekable());
+    let (mut now_a, mut now_b) = (None, None);
+    std::iter::from_fn(move || {
+        let starts = [next_a.peek().map(|r| r.0), next_b.peek().map(|r| r.0)];
+        let window = starts.into_iter().flatten().min()?;
+        if let Some((_, shown)) = next_a.next_if(|run| run.0 == window) {
+            now_a = shown;
+        }
+        if let Some((_, shown)) = next_b.next_if(|run| run.0 == window) {
+            now_b = shown;
+        }
+        Some((now_a, now_b))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[expect(clippy::unnecessary_wraps, reason = "lists of optional looks")]
+    fn shown(hz: f64, mark: Option<Mark>) -> Option<Shown> {
+        Some(Shown {
+            hz: Some(hz),
+            mark,
+            ..Shown::plain(7, State::Active, Confidence::Measured)
+        })
+    }
+
+    #[test]
+    fn shown_elements_can_be_looked_up() {
+        let all = [
+            None,
+            shown(1.0, Some(Mark::Added)),
+            shown(1.0, None),
+            shown(2.0, None),
+            shown(1.0, None),
+            None,
+        ];
+        let looks = Looks::of(all.iter().map(Option::as_ref));
+        for (window, want) in all.iter().enumerate() {
+            assert_eq!(looks.at(window), want.as_ref(), "{window}");
+        }
+        assert_eq!(looks.at(99), None);
+        assert_eq!(looks.distinct().len(), 3);
+    }
+
+    #[test]
+    fn equal_looks_are_stored_once() {
+        let all: Vec<_> = (0..100).map(|n| shown(f64::from(n % 20), None)).collect();
+        let looks = Looks::of(all.iter().map(Option::as_ref));
+        assert_eq!(looks.distinct().len(), 20);
+        assert_eq!(looks.at(57), all[57].as_ref());
+    }
+
+    #[test]
+    fn constant_elements_take_no_memory() {
+        let (slow, fast) = (shown(1.0, None), shown(2.0, None));
+        let all = (0..10_000).map(|n| if n < 5000 { &slow } else { &fast });
+        let looks = Looks::of(all.map(Option::as_ref));
+        assert_eq!((looks.distinct().len(), looks.runs().count()), (2, 2));
+    }
+
+    #[test]
+    fn two_series_of_looks_are_paired_by_window() {
+        let (one, two) = (shown(1.0, None), shown(2.0, None));
+        let a = Looks::of([one.as_ref(), one.as_ref(), two.as_ref()]);
+        let b = Looks::of([None, one.as_ref(), one.as_ref()]);
+        let hz = |shown: Option<&Shown>| shown.and_then(|s| s.hz);
+        let reported: Vec<_> = both(&a, &b).map(|(a, b)| (hz(a), hz(b))).collect();
+        let want = [(1.0, None), (1.0, Some(1.0)), (2.0, Some(1.0))];
+        assert_eq!(reported, want.map(|(a, b)| (Some(a), b)));
     }
 }

@@ -1,65 +1,30 @@
-//! The state of items and arrows in one window: states, rates and counts gathered from the graph's elements.
+//! The state of items and arrows in one window: existence by the event log, and states, rates and counts of their elements.
+//!
+//! Existence is derived from the event log and not from the messages in a window, so that no element appears, vanishes or
+//! changes its look without an event: an element without a beginning in the log existed before, one without an end stays.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::items::{EdgePlace, Viewed};
-use super::lives::Alive;
+use super::items::Viewed;
 use super::{
-    Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Members, Shown, TopicRow, ViewOptions, sum,
+    Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Members, Shown, TopicRow, ViewOptions,
 };
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Confidence;
-use crate::graph::{ById, EdgeId, Element, NodeId, PerElement, Row, State, TopicId};
-use crate::mission::event_log::{Event, Kind};
-use crate::mission::{EventId, Mission};
+use crate::graph::{ById, EdgeId, Element, Elements, PerElement, Row, State, TopicId};
+use crate::mission::Mission;
+use crate::mission::event_log::{Event, EventId, Kind};
 
-/// Adds an element of an item or arrow: the most active state and the strongest confidence are kept, rates
-/// and counts are summed.
-fn gather(slot: &mut Option<Shown>, id: u32, one: &One) {
-    let (state, confidence) = (one.state, one.confidence);
-    let shown = slot.get_or_insert_with(|| Shown {
-        is_paused: true,
-        is_starved: true,
-        ..Shown::plain(id, state, confidence)
-    });
+/// Adds an element to an item or arrow.
+fn gather(slot: &mut Option<Shown>, id: u32, one: Shown) {
     // Elements that exist without publishing would dilute the rate of each.
-    shown.each += usize::from(one.hz.is_some_and(|hz| hz > 0.0));
-    shown.is_paused &= one.is_paused;
-    shown.is_starved &= one.is_starved;
-    shown.state = shown.state.min(state);
-    shown.confidence = shown.confidence.min(confidence);
-    shown.hz = sum(shown.hz, one.hz, |a, b| a + b);
-    shown.count = sum(shown.count, one.count, u64::saturating_add);
-}
-
-/// One element of the graph in a window.
-#[derive(Clone, Copy)]
-struct One {
-    state: State,
-    confidence: Confidence,
-    hz: Option<f64>,
-    count: Option<u64>,
-    is_paused: bool,
-    is_starved: bool,
-}
-
-impl One {
-    /// An element that exists without a message in the window.
-    const WITHOUT_MESSAGES: Self = Self {
-        state: State::Silent,
-        confidence: Confidence::Declared,
-        hz: None,
-        count: None,
-        is_paused: false,
-        is_starved: false,
-    };
-
-    fn new(state: State, confidence: Confidence) -> Self {
-        Self {
-            state,
-            confidence,
-            ..Self::WITHOUT_MESSAGES
+    let each = usize::from(one.hz.is_some_and(|hz| hz > 0.0));
+    match slot {
+        Some(all) => {
+            all.add(&one);
+            all.each += each;
         }
+        None => *slot = Some(Shown { id, each, ..one }),
     }
 }
 
@@ -73,7 +38,7 @@ pub(crate) struct LivingItems {
 }
 
 impl LivingItems {
-    pub(crate) fn of(viewed: &Viewed, alive: &Alive) -> Self {
+    pub(crate) fn of(viewed: &Viewed<'_>, alive: &Alive) -> Self {
         let lives = |element: &Element| alive.is(*element);
         let items = viewed
             .items
@@ -120,7 +85,7 @@ pub(crate) fn shows_node(state: State, options: &ViewOptions) -> bool {
 pub(crate) struct Now<'a> {
     mission: &'a Mission,
     options: &'a ViewOptions,
-    viewed: &'a Viewed,
+    viewed: &'a Viewed<'a>,
     /// The current window, or an earlier one of the same length.
     span: Span,
     /// The elements that exist in it, and those that pause.
@@ -137,10 +102,14 @@ pub(crate) struct Now<'a> {
 
 impl<'a> Now<'a> {
     /// The state before the first window, in which nothing is known.
-    pub(crate) fn new(mission: &'a Mission, options: &'a ViewOptions, viewed: &'a Viewed) -> Self {
+    pub(crate) fn new(
+        mission: &'a Mission,
+        options: &'a ViewOptions,
+        viewed: &'a Viewed<'a>,
+    ) -> Self {
         let mut senders = ById::like(&mission.elements.topics, Vec::new());
-        for (id, (_, topic)) in viewed.published.with_ids() {
-            senders[*topic].push(id);
+        for (id, edge) in mission.elements.publishes.with_ids() {
+            senders[edge.topic].push(id);
         }
         Self {
             mission,
@@ -172,36 +141,37 @@ impl<'a> Now<'a> {
         window.nanos() != self.span.nanos()
     }
 
-    /// The state of an element, `None` if it does not exist; [`One::WITHOUT_MESSAGES`] if it exists without messages.
-    fn one(&self, what: Element) -> Option<One> {
+    /// The look of an element, `None` if it does not exist; silent and only declared if it exists without messages.
+    fn one(&self, what: Element) -> Option<Shown> {
         let (alive, paused) = &self.lives;
-        // Few bags count what subscribers get, so that lines to all of them look alike.
-        let counted = !matches!(what, Element::Subscribe(_));
-        let known = |row: &Row| One {
-            hz: row.hz(self.span).filter(|_| counted),
-            count: row.count.filter(|_| counted),
-            ..One::new(row.state, row.confidence)
-        };
-        alive.is(what).then(|| {
-            let row = self.rows.of(what).and_then(Option::as_ref);
-            let mut one = row.map_or(One::WITHOUT_MESSAGES, known);
-            if let (None, Some(row)) = (one.hz, self.row_of_sole(what)) {
+        if !alive.is(what) {
+            return None;
+        }
+        let row = self.rows.of(what).and_then(Option::as_ref);
+        let mut one = Shown::plain(0, State::Silent, Confidence::Declared);
+        if let Some(row) = row {
+            one = Shown::plain(0, row.state, row.confidence);
+            // Few bags count what subscribers get, so that lines to all of them look alike.
+            if !matches!(what, Element::Subscribe(_)) {
                 (one.hz, one.count) = (row.hz(self.span), row.count);
             }
-            if paused.is(what) {
-                one.is_paused = true;
-                one.state = one.state.max(State::Silent);
-            }
-            let starves = |(edge, span): &(Element, Span)| {
-                *edge == what && span.start < self.span.end && self.span.start < span.end
-            };
-            one.is_starved = self.starved.iter().any(starves);
-            if let Some(topic) = self.waits_for(what) {
-                one.is_paused = true;
-                one.state = self.state_of_waiting(topic).max(one.state);
-            }
-            one
-        })
+        }
+        if let (None, Some(row)) = (one.hz, self.row_of_sole(what)) {
+            (one.hz, one.count) = (row.hz(self.span), row.count);
+        }
+        if paused.is(what) {
+            one.is_paused = true;
+            one.state = one.state.max(State::Silent);
+        }
+        let starves = |(edge, span): &(Element, Span)| {
+            *edge == what && span.start < self.span.end && self.span.start < span.end
+        };
+        one.is_starved = self.starved.iter().any(starves);
+        if let Some(topic) = self.waits_for(what) {
+            one.is_paused = true;
+            one.state = self.state_of_waiting(topic).max(one.state);
+        }
+        Some(one)
     }
 
     /// For the only publication of a topic, the row of the topic: all its messages come from there.
@@ -209,10 +179,9 @@ impl<'a> Now<'a> {
         let Element::Publish(id) = what else {
             return None;
         };
-        let (_, topic) = self.viewed.published.get(id)?;
-        let sole = self.sole.get(*topic)?;
-        sole.filter(|sole| *sole == id)?;
-        self.rows.of(Element::Topic(*topic))?.as_ref()
+        let topic = self.mission.elements.ends(what).1?;
+        self.sole.get(topic)?.filter(|sole| *sole == id)?;
+        self.rows.of(Element::Topic(topic))?.as_ref()
     }
 
     /// The topic of an element, if its first message comes after the window. A latched one needs no message.
@@ -237,40 +206,35 @@ impl<'a> Now<'a> {
         }
     }
 
-    fn node(&self, id: NodeId) -> Option<One> {
-        // The count of a node is that of its topics' messages.
-        let one = self.one(Element::Node(id))?;
-        Some(One { count: None, ..one })
-    }
-
     /// The look of an item; `None` if no part of it exists. Ghosts are excluded.
     pub(crate) fn item(&self, id: ItemId) -> Option<Shown> {
         let item = self.viewed.items.get(id)?;
+        let has_nodes = item.members.first().is_some_and(Element::is_node);
         let mut slot = None;
         for member in &item.members {
-            let one = match member {
-                Element::Node(node) => self
-                    .node(*node)
-                    .filter(|one| shows_node(one.state, self.options)),
-                Element::Topic(topic) => self
-                    .one(Element::Topic(*topic))
-                    // The nodes inside a collapsed namespace already count what they publish.
-                    .map(|one| One {
-                        hz: one.hz.filter(|_| !has_nodes(item)),
-                        ..one
-                    }),
-                Element::Publish(_) | Element::Subscribe(_) => None,
+            let Some(mut one) = self.one(*member) else {
+                continue;
             };
-            if let Some(one) = one {
-                gather(&mut slot, id.0, &one);
+            if member.is_topic() && has_nodes {
+                // The nodes inside a collapsed namespace already count what they publish.
+                one.hz = None;
+            } else if member.is_node() {
+                if !shows_node(one.state, self.options) {
+                    continue;
+                }
+                // The count of a node is that of its topics' messages.
+                one.count = None;
             }
+            gather(&mut slot, id.0, one);
         }
         let mut shown = slot?;
         if item.is_service {
             shown.is_called();
         }
-        if let ([Element::Node(node)], true) = (&item.members[..], is_single(self.viewed, id)) {
-            let row = self.rows.of(Element::Node(*node)).and_then(Option::as_ref);
+        if let [node @ Element::Node(_)] = &item.members[..]
+            && item.kind != ItemKind::Namespace
+        {
+            let row = self.rows.of(*node).and_then(Option::as_ref);
             shown.lifecycle = row.and_then(|row| self.mission.graphs.lifecycle_word(row));
         }
         if !item.is_replica {
@@ -313,18 +277,14 @@ impl<'a> Now<'a> {
     fn edges(&self, id: ArrowId, arrow: &Arrow) -> Option<Shown> {
         let mut slot = None;
         for member in &arrow.members {
-            let one = match member {
-                Element::Publish(edge) => self.one(Element::Publish(*edge)),
-                Element::Subscribe(edge) => {
-                    let ends = self.viewed.subscribed.get(*edge);
-                    let topic = ends.and_then(|(_, topic)| self.one(Element::Topic(*topic)));
-                    self.one(Element::Subscribe(*edge))
-                        .filter(|_| topic.is_some())
+            if let Element::Subscribe(_) = member {
+                let topic = self.mission.elements.ends(*member).1;
+                if !topic.is_some_and(|topic| self.lives.0.is(Element::Topic(topic))) {
+                    continue;
                 }
-                Element::Node(_) | Element::Topic(_) => None,
-            };
-            if let Some(one) = one {
-                gather(&mut slot, id.0, &one);
+            }
+            if let Some(one) = self.one(*member) {
+                gather(&mut slot, id.0, one);
             }
         }
         slot
@@ -355,20 +315,19 @@ impl<'a> Now<'a> {
             if is_bundle && last.replace(publish) == Some(publish) {
                 continue;
             }
-            let topic = self.viewed.subscribed.get(*subscribe).map(|s| s.1);
+            let topic = self.mission.elements.ends(Element::Subscribe(*subscribe)).1;
             let is_new = topic.is_some_and(|topic| carried.insert(topic));
             // The rate of the whole topic counts once, regardless of the number of publishers.
             let topic = topic.filter(|_| is_new || !is_bundle);
             let topic = topic.and_then(|topic| self.one(Element::Topic(topic)));
-            let joined = One {
+            let joined = Shown {
                 state: p.state.max(s.state),
                 confidence: p.confidence.max(s.confidence),
                 hz: p.hz.or_else(|| topic.and_then(|t| t.hz)),
-                count: p.count,
-                is_paused: p.is_paused,
                 is_starved: s.is_starved,
+                ..p
             };
-            gather(&mut slot, id.0, &joined);
+            gather(&mut slot, id.0, joined.clone());
             if let Some((topic, _)) = row {
                 if self
                     .mission
@@ -377,25 +336,17 @@ impl<'a> Now<'a> {
                 {
                     services.insert(topic);
                 }
-                gather(&mut rows.entry(topic).or_default().0, topic, &joined);
+                gather(&mut rows.entry(topic).or_default().0, topic, joined);
             }
         }
         let topics = rows.into_values().filter_map(|(shown, ways)| {
-            let shown = shown?;
+            let mut shown = shown?;
+            if shown.is_paused {
+                shown.state = shown.state.max(State::Silent);
+            }
             Some(TopicRow {
-                topic: shown.id,
-                ways,
                 is_service: services.contains(&shown.id),
-                is_starved: shown.is_starved,
-                state: if shown.is_paused {
-                    shown.state.max(State::Silent)
-                } else {
-                    shown.state
-                },
-                hz: shown.hz,
-                count: shown.count,
-                mark: None,
-                rates: None,
+                ..TopicRow::of(shown.id, ways, &shown)
             })
         });
         let topics = topics.collect();
@@ -414,21 +365,7 @@ impl<'a> Now<'a> {
 
     /// The item that shows an element, and the arrows.
     pub(crate) fn shown_by(&self, what: Element) -> (Option<ItemId>, &[ArrowId]) {
-        let is_direct = self.options.mode.is_direct();
-        let edge = |place: Option<&'a EdgePlace>| match place {
-            _ if is_direct => self.viewed.carriers(what),
-            Some(EdgePlace::Arrow(id)) => std::slice::from_ref(id),
-            _ => &[],
-        };
-        match what {
-            Element::Node(id) => (self.viewed.node.get(id).copied().flatten(), &[]),
-            Element::Topic(id) => {
-                let item = self.viewed.topic.get(id).copied().flatten();
-                (item, self.viewed.carriers(what))
-            }
-            Element::Publish(id) => (None, edge(self.viewed.publish.get(id))),
-            Element::Subscribe(id) => (None, edge(self.viewed.subscribe.get(id))),
-        }
+        (self.viewed.item_of(what), self.viewed.carriers(what))
     }
 }
 
@@ -447,11 +384,174 @@ fn starved(mission: &Mission) -> Vec<(Element, Span)> {
     edges.map(lasts).collect()
 }
 
-fn has_nodes(item: &Item) -> bool {
-    matches!(item.members.first(), Some(Element::Node(_)))
+/// Beginnings and ends in continuous time.
+pub(crate) struct ItemTurns<'a> {
+    elements: &'a Elements,
+    /// Per element, the times at which it began (true) and ended (false), sorted.
+    turns: PerElement<Vec<(Stamp, bool)>>,
+    /// Per element, the times in which it was silent or away.
+    pauses: PerElement<Vec<Span>>,
 }
 
-fn is_single(viewed: &Viewed, item: ItemId) -> bool {
-    let item = viewed.items.get(item);
-    item.is_some_and(|i| i.members.len() == 1 && i.kind != ItemKind::Namespace)
+/// Whether each element exists.
+pub(crate) type Alive = PerElement<bool>;
+
+impl<'a> ItemTurns<'a> {
+    pub(crate) fn new(mission: &'a Mission) -> Self {
+        let mut lives = Self {
+            elements: &mission.elements,
+            turns: PerElement::new(&mission.elements, |_| Vec::new()),
+            pauses: PerElement::new(&mission.elements, |_| Vec::new()),
+        };
+        let events = &mission.log.events;
+        let kept = kept(&mission.elements, events);
+        for event in events {
+            // A part is reported with its whole, so it appears and vanishes with it.
+            let whole = event.part_of.and_then(|id| events.get(id));
+            let key = |whole| (whole, part(&mission.elements, event.what));
+            if event.part_of.is_some_and(|id| kept.contains(&key(id))) {
+                continue;
+            }
+            let begins = match event.kind {
+                Kind::Started | Kind::Appeared => true,
+                Kind::Stopped | Kind::Vanished => false,
+                Kind::Restarted | Kind::Silent => {
+                    let (start, end) = (event.time, event.until.unwrap_or(event.time));
+                    if let Some(pauses) = lives.pauses.of_mut(event.what) {
+                        pauses.push(Span::new(start, end));
+                    }
+                    continue;
+                }
+                _ => continue,
+            };
+            let whole = whole.unwrap_or(event);
+            // A run of a role begins where the last one ended, away until it is back.
+            let is_new = begins && whole.kind == Kind::Restarted && !event.what.is_node();
+            let end = whole.until.filter(|_| is_new);
+            let turn = (end.unwrap_or(whole.time), begins);
+            if let Some(turns) = lives.turns.of_mut(event.what) {
+                turns.push(turn);
+            }
+        }
+        for turns in lives.turns.values_mut() {
+            turns.sort_by_key(|turn| turn.0);
+        }
+        lives
+    }
+
+    /// The elements that exist just before a moment.
+    pub(crate) fn before(&self, at: Stamp) -> Alive {
+        self.alive(at, |turns| {
+            lives_at(turns, turns.partition_point(|t| t.0 < at))
+        })
+    }
+
+    /// The elements that exist at any time of a window.
+    pub(crate) fn during(&self, span: Span) -> Alive {
+        self.alive(span.end, |turns| {
+            let first = turns.partition_point(|t| t.0 < span.start);
+            let inside = turns[first..].iter().take_while(|t| t.0 < span.end);
+            lives_at(turns, first) || inside.into_iter().any(|t| t.1)
+        })
+    }
+
+    /// Elements that are silent or away during a whole window. A publication pauses with its node, a topic
+    /// with all of its publications, a subscription with its topic.
+    pub(crate) fn paused(&self, span: Span, alive: &Alive) -> Alive {
+        let own = |what| {
+            let covers = |pause: &Span| pause.start <= span.start && span.end <= pause.end;
+            self.pauses
+                .of(what)
+                .is_some_and(|pauses| pauses.iter().any(covers))
+        };
+        let mut sent: ById<TopicId, Option<bool>> = ById::like(&self.elements.topics, None);
+        for (id, edge) in self.elements.publishes.with_ids() {
+            let what = Element::Publish(id);
+            if alive.is(what) {
+                let is_paused = own(what) || own(Element::Node(edge.node));
+                let all = &mut sent[edge.topic];
+                *all = Some(all.unwrap_or(true) && is_paused);
+            }
+        }
+        let topic = |id: TopicId| own(Element::Topic(id)) || sent[id] == Some(true);
+        PerElement::new(self.elements, |what| {
+            match (what, self.elements.ends(what)) {
+                (Element::Topic(_) | Element::Subscribe(_), (_, Some(id))) => topic(id),
+                (_, (Some(node), _)) => own(what) || own(Element::Node(node)),
+                _ => false,
+            }
+        })
+    }
+
+    /// `own` returns whether an element exists according to its own beginnings and ends, the last of them
+    /// before `end`. An edge exists as long as its node; a topic without beginnings and ends of its own
+    /// exists with its edges or, without edges, from its first message on.
+    fn alive(&self, end: Stamp, own: impl Fn(&[(Stamp, bool)]) -> bool) -> Alive {
+        let own = |what| {
+            let turns = self.turns.of(what).filter(|turns| !turns.is_empty())?;
+            Some(own(turns))
+        };
+        let mut alive = PerElement::new(self.elements, |what| {
+            let is = |what| own(what) != Some(false);
+            match self.elements.ends(what) {
+                (Some(node), Some(topic)) => {
+                    is(what) && is(Element::Node(node)) && is(Element::Topic(topic))
+                }
+                _ => is(what),
+            }
+        });
+        let mut carried: ById<TopicId, Option<bool>> = ById::like(&self.elements.topics, None);
+        for (what, edge) in self.elements.edges() {
+            let carried = &mut carried[edge.topic];
+            *carried = Some(carried.unwrap_or(false) || alive.is(what));
+        }
+        for (id, carried) in carried.with_ids() {
+            let topic = Element::Topic(id);
+            let first = self.elements.topics[id].seen.first;
+            let lives = carried.unwrap_or(first.is_none_or(|first| first < end));
+            if let (None, Some(is)) = (own(topic), alive.of_mut(topic)) {
+                *is = lives;
+            }
+        }
+        alive
+    }
+}
+
+/// The topic, or the edge with its topic and its node's role, that an event is about: the same for each run of a role.
+type PartKey<'a> = (bool, Option<&'a str>, Option<TopicId>);
+
+fn part(elements: &Elements, what: Element) -> PartKey<'_> {
+    let (node, topic) = elements.ends(what);
+    let role = node.map(|id| &*elements.nodes[id].role);
+    (matches!(what, Element::Publish(_)), role, topic)
+}
+
+/// The topics and edges that a node has before and after its restart: these stay. Nodes are not among them: for a role,
+/// one run ends and the next one begins, otherwise each run would exist all the time.
+fn kept<'a>(
+    elements: &'a Elements,
+    events: &ById<EventId, Event>,
+) -> BTreeSet<(EventId, PartKey<'a>)> {
+    let mut seen: BTreeMap<(EventId, PartKey<'_>), [bool; 2]> = BTreeMap::new();
+    for event in events {
+        let whole = event.part_of.and_then(|id| Some((id, events.get(id)?)));
+        let restart = whole.filter(|(_, whole)| whole.kind == Kind::Restarted);
+        if let Some((id, _)) = restart.filter(|_| !event.what.is_node()) {
+            let key = (id, part(elements, event.what));
+            let [ends, begins] = seen.entry(key).or_default();
+            *ends |= event.kind == Kind::Vanished;
+            *begins |= event.kind == Kind::Appeared;
+        }
+    }
+    seen.retain(|_, [ends, begins]| *ends && *begins);
+    seen.into_keys().collect()
+}
+
+/// Whether an element exists after the first `done` of its beginnings and ends; before all of them, it exists
+/// unless the first is a beginning.
+fn lives_at(turns: &[(Stamp, bool)], done: usize) -> bool {
+    match done.checked_sub(1).and_then(|last| turns.get(last)) {
+        Some((_, begins)) => *begins,
+        None => turns.first().is_none_or(|(_, begins)| !begins),
+    }
 }

@@ -13,7 +13,7 @@ use crate::draw::style::{Body, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::graph::{ById, Id as _, State};
 use crate::layout::{self, Link, Outline, Plan, Vertex};
-use crate::view::looks::both;
+use crate::view::both;
 use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Looks, Shown, View};
 
 /// The largest width of a name in pixels, and in heights of its letters if these are large; longer ones are shortened in

@@ -9,7 +9,7 @@ use crate::draw::scene::{Anchor, Form, Group, Shape, Text};
 use crate::draw::style::Color;
 use crate::draw::text::Weight;
 use crate::graph::{ById, Id as _};
-use crate::view::words::DrawnPart;
+use crate::view::DrawnPart;
 use crate::view::{ArrowId, ItemId, ItemKind, Looks, View};
 
 impl Picture<'_> {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::base::name::{is_quiet, last_part};
-use crate::base::time::{Span, Stamp};
+use crate::base::time::Span;
 use crate::evidence::Confidence;
 use crate::graph::history::Sender;
 use crate::graph::{ById, Edge, EdgeId, Element, Node, NodeId, TopicId};

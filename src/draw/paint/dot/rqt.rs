@@ -21,7 +21,7 @@ const MARGIN: f64 = 8.0;
 const POINTS_PER_INCH: f64 = 72.0;
 
 impl DotView<'_> {
-    /// One window, or the [`union`](crate::view::union::union()) of all.
+    /// One window, or the [`union`](crate::view::union()) of all.
     pub(crate) fn write(&self, seen: &SeenWindow) -> String {
         let size = self.layout.size;
         let bb = format!("0,0,{},{}", number(size.w), number(size.h));

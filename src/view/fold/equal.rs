@@ -1,18 +1,20 @@
-//! Namespaces and names that only differ in their index, such as the robots of a fleet: they are drawn once
-//! for all.
+//! Namespaces and names that only differ in their index, such as the robots of a fleet: they are drawn once for all.
+//!
+//! `/robot1/drive>/robot1/odom`, `/robot2/drive>/robot2/odom` and `/robot3/drive>/robot3/odom` are `/robotN/drive` and
+//! `/robotN/odom`; a fourth robot that also publishes `/robot4/image` stays beside them.
 
-use std::cell::LazyCell;
 use std::cmp::Reverse;
 use std::collections::hash_map::DefaultHasher;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{Hash, Hasher as _};
 use std::sync::Arc;
 
-use super::ViewOptions;
+use super::{Fold, ItemKey, Keys};
 use crate::base::name::{is_within, namespace};
 use crate::graph::{Element, Elements};
+use crate::view::ViewOptions;
 
-/// The least number of equal namespaces that are drawn as one; fewer are drawn side by side.
+/// The least number of equal namespaces that are drawn as one: two side by side are as easy to read as one for both.
 const FEWEST: usize = 3;
 
 /// The most equal namespaces that are drawn as one: the presence of each is stored for each window.
@@ -21,7 +23,8 @@ const MOST: usize = 1024;
 /// The most digits of an index: longer numbers are times, process numbers or serial numbers.
 const MOST_DIGITS: usize = 6;
 
-/// The largest number of searches for fleets among the remaining namespaces.
+/// The largest number of searches for fleets among the remaining namespaces: each finds the largest of every stem, and more
+/// than a few different kinds of robots have not been seen.
 const MOST_ROUNDS: usize = 16;
 
 /// Namespaces, or single names, with the same graph, drawn as one.
@@ -48,122 +51,87 @@ pub(crate) struct Fleets {
     pub(crate) all: Vec<Fleet>,
     /// The index of each namespace's fleet, by the name of the namespace.
     place: BTreeMap<Arc<str>, usize>,
-    /// The index of each fleet by the name it is drawn under.
-    drawn: BTreeMap<Arc<str>, usize>,
 }
 
-/// A hash for each element that a namespace contains or is linked to, without the name of the namespace, sorted.
-type Inside = Vec<u64>;
+/// A hash for each element that a namespace contains or is linked to, without the name of the namespace.
+type Inside = BTreeSet<u64>;
+
+/// The names in each namespace with an index, with their elements.
+type Spaces<'a> = BTreeMap<&'a str, Vec<(&'a str, Element)>>;
 
 impl Fleets {
     /// The fleets among these elements, except namespaces that are kept open.
     pub(crate) fn new(elements: &Elements, options: &ViewOptions) -> Self {
         let kept = options.expand.iter().chain(&options.collapse);
         let kept: BTreeSet<&str> = kept.map(|k| k.trim_end_matches('/')).collect();
-        let mut described = described(elements);
-        described.retain(|(space, _)| !kept.contains(space));
-        described.sort_unstable_by_key(|(space, what)| (stem(space), *space, *what));
-        described.dedup();
-        let single = LazyCell::new(|| single_names(elements));
-        let mut found: Vec<(&str, Vec<&str>)> = Vec::new();
-        for spaces in described.chunk_by(|a, b| stem(a.0) == stem(b.0)) {
-            let mut alike: BTreeMap<Inside, Vec<&str>> = BTreeMap::new();
-            for space in spaces.chunk_by(|a, b| a.0 == b.0) {
-                let inside = space.iter().map(|(_, what)| *what).collect();
-                alike.entry(inside).or_default().push(space[0].0);
+        let mut spaces = Spaces::new();
+        for (name, element) in names(elements) {
+            if let Some(space) = space_of(name) {
+                spaces.entry(space).or_default().push((name, element));
             }
+        }
+        let mut alike: BTreeMap<&str, BTreeMap<Inside, Vec<&str>>> = BTreeMap::new();
+        for (space, inside) in described(elements) {
+            if !kept.contains(space) {
+                let alike = alike.entry(stem(space)).or_default();
+                alike.entry(inside).or_default().push(space);
+            }
+        }
+        let mut found: Vec<(&str, Vec<&str>)> = Vec::new();
+        for (stem, alike) in alike {
             let many: usize = alike.values().map(Vec::len).sum();
             // The largest, or of several the one whose first name comes first; members that differ stay
             // beside it.
             let largest = alike.into_values().max_by_key(|m| (m.len(), Reverse(m[0])));
             // A few single names are easily equal by chance.
-            let is_rule =
-                |m: &Vec<&str>| 2 * m.len() > many || !m.iter().all(|s| single.contains(s));
-            if let Some(members) =
-                largest.filter(|m| (FEWEST..=MOST).contains(&m.len()) && is_rule(m))
-            {
-                found.push((stem(members[0]), members));
-            }
+            let is_single = |space: &&str| spaces[space].iter().all(|(name, _)| name == space);
+            let is_rule = |m: &Vec<&str>| 2 * m.len() > many || !m.iter().all(is_single);
+            let is_fleet = |m: &Vec<&str>| (FEWEST..=MOST).contains(&m.len()) && is_rule(m);
+            found.extend(largest.filter(is_fleet).map(|members| (stem, members)));
         }
-        if found.is_empty() {
-            return Self::default();
-        }
-        keep_linked(&mut found, &partners(elements));
-        let known = Known::new(elements);
+        keep_linked(&mut found, elements);
         let mut fleets = Self::default();
         for (stem, mut members) in found {
             members.sort_by_key(|m| (m.len(), *m));
-            fleets.add(stem, &members, &known);
+            let digits = members.last().map_or(1, |m| m.len() - stem.len());
+            let name = format!("{stem}{}", "N".repeat(digits));
+            if names(elements).any(|(other, _)| is_within(other, &name)) {
+                continue;
+            }
+            for member in &members {
+                fleets.place.insert((*member).into(), fleets.all.len());
+            }
+            let nodes_or_topics = |space: &&str| {
+                let inside = spaces[space].iter().map(|(_, element)| *element);
+                let (nodes, topics): (Vec<_>, Vec<_>) = inside.partition(Element::is_node);
+                if nodes.is_empty() { topics } else { nodes }
+            };
+            fleets.all.push(Fleet {
+                name: name.into(),
+                elements: members.iter().map(nodes_or_topics).collect(),
+                members: members.into_iter().map(Arc::from).collect(),
+            });
         }
         fleets
     }
 
-    fn add(&mut self, stem: &str, members: &[&str], known: &Known<'_>) {
-        let digits = members.iter().map(|m| m.len() - stem.len()).max();
-        let name = format!("{stem}{}", "N".repeat(digits.unwrap_or(1)));
-        if known.holds(&name) {
-            return;
-        }
-        let name: Arc<str> = name.into();
-        self.drawn.insert(Arc::clone(&name), self.all.len());
-        for member in members {
-            self.place.insert(Arc::from(*member), self.all.len());
-        }
-        self.all.push(Fleet {
-            name,
-            elements: members.iter().map(|m| known.nodes_or_topics(m)).collect(),
-            members: members.iter().map(|m| Arc::from(*m)).collect(),
-        });
+    /// The elements of fleets, under the names that they are drawn under.
+    pub(crate) fn folds(&self, keys: &Keys) -> Vec<Fold> {
+        let fold = |(what, key): (Element, &Option<ItemKey>)| {
+            let key = key.as_ref()?;
+            let space = space_of(&key.name)?;
+            let fleet = self.all.get(*self.place.get(space)?)?;
+            let rest = key.name.get(space.len()..)?;
+            let (kind, name) = (key.kind, format!("{}{rest}", fleet.name).into());
+            let key = ItemKey { kind, name };
+            Some(Fold { what, key })
+        };
+        keys.iter().filter_map(fold).collect()
     }
 
-    /// The name under which a member of a fleet is drawn; `None` for everything else.
-    pub(crate) fn stand_in(&self, name: &str) -> Option<Arc<str>> {
-        let space = space_of(name)?;
-        let fleet = self.all.get(*self.place.get(space)?)?;
-        let rest = name.get(space.len()..)?;
-        Some(format!("{}{rest}", fleet.name).into())
-    }
-
-    /// The fleet that an element drawn under this name is part of.
-    pub(crate) fn of(&self, drawn: &str) -> Option<&Fleet> {
-        let around = std::iter::successors(Some(drawn), |name| Some(namespace(name)));
-        let mut around = around.take_while(|name| name.len() > 1);
-        let place = around.find_map(|name| self.drawn.get(name))?;
-        self.all.get(*place)
-    }
-}
-
-/// The names of a mission, and the contents of each namespace with an index.
-struct Known<'a> {
-    names: BTreeSet<&'a str>,
-    inside: BTreeMap<&'a str, Vec<Element>>,
-}
-
-impl<'a> Known<'a> {
-    fn new(elements: &'a Elements) -> Self {
-        let mut inside: BTreeMap<&str, Vec<Element>> = BTreeMap::new();
-        for (name, element) in names(elements) {
-            if let Some(space) = space_of(name) {
-                inside.entry(space).or_default().push(element);
-            }
-        }
-        Self {
-            names: names(elements).map(|(name, _)| name).collect(),
-            inside,
-        }
-    }
-
-    /// Whether an element has the name of this namespace or is in it.
-    fn holds(&self, space: &str) -> bool {
-        let below = format!("{space}/");
-        let next = self.names.range(below.as_str()..).next();
-        self.names.contains(space) || next.is_some_and(|name| name.starts_with(&below))
-    }
-
-    fn nodes_or_topics(&self, space: &str) -> Vec<Element> {
-        let all = self.inside.get(space).into_iter().flatten().copied();
-        let (nodes, topics): (Vec<Element>, Vec<Element>) = all.partition(Element::is_node);
-        if nodes.is_empty() { topics } else { nodes }
+    /// Whether an element drawn under this name is part of a fleet.
+    pub(crate) fn has(&self, drawn: &str) -> bool {
+        self.all.iter().any(|fleet| is_within(drawn, &fleet.name))
     }
 }
 
@@ -198,16 +166,12 @@ fn names(elements: &Elements) -> impl Iterator<Item = (&str, Element)> {
 
 /// The outermost namespace around a name that ends in a number, or else the name itself if it does.
 fn space_of(name: &str) -> Option<&str> {
-    let mut found = None;
-    let mut space = name;
-    while space.len() > 1 {
-        let digits = space.len() - stem(space).len();
-        if (1..=MOST_DIGITS).contains(&digits) && !stem(space).ends_with('/') {
-            found = Some(space);
-        }
-        space = namespace(space);
-    }
-    found
+    let around = std::iter::successors(Some(name), |name| Some(namespace(name)));
+    let around = around.take_while(|space| space.len() > 1);
+    let is_numbered = |space: &&str| {
+        (1..=MOST_DIGITS).contains(&index(space).len()) && !stem(space).ends_with('/')
+    };
+    around.filter(is_numbered).last()
 }
 
 /// A name without the number at its end.
@@ -220,28 +184,23 @@ fn index(space: &str) -> &str {
     &space[stem(space).len()..]
 }
 
-/// Every namespace with a number, and a hash for each element in it and each of their edges.
-fn described(elements: &Elements) -> Vec<(&str, u64)> {
-    let mut all = Vec::new();
+/// Every namespace with a number, with a hash for each element in it and each of their edges.
+fn described(elements: &Elements) -> BTreeMap<&str, Inside> {
+    let mut all: BTreeMap<&str, Inside> = BTreeMap::new();
     for (name, element) in names(elements) {
-        let kind = element.is_node();
         if let Some(space) = space_of(name) {
-            all.push((space, hash(&(kind, seen(name, space)))));
+            let what = hash(&(element.is_node(), seen(name, space)));
+            all.entry(space).or_default().insert(what);
         }
     }
     for (what, _) in elements.edges() {
         let (Some(node), Some(topic)) = elements.names(what) else {
             continue;
         };
-        let sign = if matches!(what, Element::Publish(_)) {
-            '>'
-        } else {
-            '<'
-        };
-        let spaces = [space_of(node), space_of(topic)];
-        let second = spaces[1].filter(|space| spaces[0] != Some(space));
-        for space in [spaces[0], second].into_iter().flatten() {
-            all.push((space, hash(&(seen(node, space), sign, seen(topic, space)))));
+        let publishes = matches!(what, Element::Publish(_));
+        for space in [space_of(node), space_of(topic)].into_iter().flatten() {
+            let what = hash(&(seen(node, space), publishes, seen(topic, space)));
+            all.entry(space).or_default().insert(what);
         }
     }
     all
@@ -270,38 +229,23 @@ fn seen<'a>(name: &'a str, space: &str) -> Seen<'a> {
     }
 }
 
-/// The namespaces that consist of one name.
-fn single_names(elements: &Elements) -> BTreeSet<&str> {
-    let mut single: BTreeSet<&str> = BTreeSet::new();
-    single.extend(names(elements).map(|(name, _)| name));
-    for (name, _) in names(elements) {
-        if let Some(space) = space_of(name).filter(|space| *space != name) {
-            single.remove(space);
-        }
-    }
-    single
-}
-
-/// The pairs of namespaces with the same index that an edge links.
-fn partners(elements: &Elements) -> Vec<(&str, &str)> {
-    let pair = |(what, _)| {
-        let (node, topic) = elements.names(what);
-        let (a, b) = (space_of(node?)?, space_of(topic?)?);
-        (a != b && index(a) == index(b)).then_some((a, b))
-    };
-    elements.edges().filter_map(pair).collect()
-}
-
 /// Drops fleets with a member that is linked to a namespace of the same index outside of all fleets, and
 /// fleets linked to these: their members only look alike.
-fn keep_linked(found: &mut Vec<(&str, Vec<&str>)>, partners: &[(&str, &str)]) {
+fn keep_linked(found: &mut Vec<(&str, Vec<&str>)>, elements: &Elements) {
     let mut place: BTreeMap<&str, usize> = BTreeMap::new();
     for (at, (_, members)) in found.iter().enumerate() {
         place.extend(members.iter().map(|member| (*member, at)));
     }
     let mut beside: Vec<Vec<usize>> = vec![Vec::new(); found.len()];
     let mut torn = Vec::new();
-    for (a, b) in partners {
+    for (what, _) in elements.edges().filter(|_| !found.is_empty()) {
+        let (node, topic) = elements.names(what);
+        let (Some(a), Some(b)) = (node.and_then(space_of), topic.and_then(space_of)) else {
+            continue;
+        };
+        if a == b || index(a) != index(b) {
+            continue;
+        }
         match (place.get(a), place.get(b)) {
             (Some(&a), Some(&b)) => {
                 beside[a].push(b);

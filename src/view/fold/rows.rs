@@ -5,11 +5,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::looks::{Looks, LooksWriter};
-use super::names::is_infrastructure;
-use super::{Arrow, ArrowId, ArrowKind, Item, ItemId, Shown, TopicRow};
 use crate::base::name::{is_unnamed, namespace};
 use crate::graph::ById;
+use crate::mission::EventId;
+use crate::view::choose::is_infrastructure;
+use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemId, Looks, Shown, TopicRow};
 
 /// A topic that is a row in a box: one without another known endpoint, or a hub.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,18 +32,18 @@ const FEWEST_ENDS: usize = 6;
 const FEWEST_HOMES: usize = 2;
 
 /// The boxes and arrows of a view, and the looks of each.
-pub(super) struct Drawn {
-    pub(super) items: ById<ItemId, Item>,
-    pub(super) arrows: ById<ArrowId, Arrow>,
-    pub(super) items_shown: ById<ItemId, Looks>,
-    pub(super) arrows_shown: ById<ArrowId, Looks>,
+pub(crate) struct Drawn {
+    pub(crate) items: ById<ItemId, Item>,
+    pub(crate) arrows: ById<ArrowId, Arrow>,
+    pub(crate) items_shown: ById<ItemId, Looks>,
+    pub(crate) arrows_shown: ById<ArrowId, Looks>,
 }
 
 impl Drawn {
     /// Makes topics with one known endpoint rows of its box and, if `hides_infrastructure`, hubs rows of all
     /// connected boxes. Topics that exist without a connection in some window stay boxes. The rows are sorted
     /// by their boxes, publications before subscriptions.
-    pub(super) fn fold_leaves(&mut self, hides_infrastructure: bool) -> Vec<CardRow> {
+    pub(crate) fn fold_leaves(&mut self, hides_infrastructure: bool) -> Vec<CardRow> {
         let mut lines: ById<ItemId, Vec<ArrowId>> = ById::like(&self.items, Vec::new());
         for (at, arrow) in self.arrows.with_ids() {
             if let Some((topic, _)) = self.topic_of(arrow) {
@@ -125,35 +125,20 @@ impl Drawn {
         let Some(looks) = self.items_shown.get(topic) else {
             return true;
         };
-        let needs_line = |k: &u32| {
-            let look = looks.at(*k as usize);
+        let needs_line = |k: &usize| {
+            let look = looks.at(*k);
             look.is_some_and(|look| !is_infrastructure || look.mark.is_some())
         };
-        let mut windows = self.turns(topic, lines).into_iter().filter(needs_line);
-        windows.all(|k| self.line(lines, k).is_some())
-    }
-
-    /// The windows in which the look of a topic or one of its arrows changes.
-    fn turns(&self, topic: ItemId, lines: &[ArrowId]) -> BTreeSet<u32> {
-        let own = self.items_shown.get(topic).into_iter();
-        let lines = lines.iter().filter_map(|at| self.arrows_shown.get(*at));
-        own.chain(lines)
+        let all = self.looks(lines).chain([looks]);
+        let mut windows = all
             .flat_map(Looks::runs)
-            .map(|run| run.0)
-            .collect()
+            .map(|run| run.0 as usize)
+            .filter(needs_line);
+        windows.all(|k| reported(self.looks(lines).filter_map(|line| line.at(k))).is_some())
     }
 
-    /// The look of the first of these arrows that exists in a window; one with a mark takes precedence.
-    fn line(&self, lines: &[ArrowId], window: u32) -> Option<&Shown> {
-        let lines = lines
-            .iter()
-            .filter_map(|at| self.arrows_shown.get(*at)?.at(window as usize));
-        let lines: Vec<&Shown> = lines.collect();
-        lines
-            .iter()
-            .find(|line| line.mark.is_some())
-            .or(lines.first())
-            .copied()
+    fn looks<'a>(&'a self, lines: &'a [ArrowId]) -> impl Iterator<Item = &'a Looks> + Clone {
+        lines.iter().filter_map(|at| self.arrows_shown.get(*at))
     }
 
     /// The row of a topic in a box; that of a hub has the rate of this box alone.
@@ -165,30 +150,25 @@ impl Drawn {
     ) -> CardRow {
         let sends = |at: &ArrowId| self.arrows[*at].to == topic;
         let receives = |at: &ArrowId| self.arrows[*at].from == topic;
-        let mut writer = LooksWriter::default();
-        for window in self.turns(topic, lines) {
-            let line = self.line(lines, window);
-            let look = self.items_shown[topic].at(window as usize);
-            let look = look.zip(line).map(|(look, line)| {
-                // A connection that appeared or vanished is also the change of the row.
-                let reported = if look.mark.is_some() { look } else { line };
-                let events = look.events.iter().chain(&line.events);
-                let events: BTreeSet<_> = events.copied().collect();
-                Shown {
-                    mark: reported.mark,
-                    rates: reported.rates,
-                    events: events.into_iter().collect(),
-                    ..(if is_infrastructure { line } else { look }).clone()
-                }
-            });
-            writer.show(window, look);
-        }
+        let own = self.items_shown.get(topic);
+        let row = |k: usize| {
+            let look = own?.at(k)?;
+            let line = reported(self.looks(lines).filter_map(|line| line.at(k)))?;
+            // A connection that appeared or vanished is also the change of the row.
+            let reported = if look.mark.is_some() { look } else { line };
+            Some(Shown {
+                mark: reported.mark,
+                rates: reported.rates,
+                events: events([look, line].into_iter()),
+                ..(if is_infrastructure { line } else { look }).clone()
+            })
+        };
         CardRow {
             owner,
             ways: [lines.iter().any(sends), lines.iter().any(receives)],
             is_infrastructure,
             item: self.items[topic].clone(),
-            shown: writer.finish(),
+            shown: Looks::made_of(self.looks(lines).chain(own), row),
         }
     }
 
@@ -202,22 +182,12 @@ impl Drawn {
             if !is_unnamed || self.arrows.iter().any(is_linked) {
                 continue;
             }
-            let own = rows
-                .iter()
-                .filter(|row| row.owner == at && !row.is_infrastructure);
-            let own: Vec<&Looks> = own.map(|row| &row.shown).collect();
-            let turns = own
-                .iter()
-                .flat_map(|shown| shown.runs())
-                .chain(looks.runs());
-            let turns: BTreeSet<u32> = turns.map(|run| run.0).collect();
-            let mut writer = LooksWriter::default();
-            for window in turns {
-                let is_there = own.iter().any(|shown| shown.at(window as usize).is_some());
-                let look = looks.at(window as usize).filter(|_| is_there);
-                writer.show(window, look.cloned());
-            }
-            *looks = writer.finish();
+            let is_own = |row: &&CardRow| row.owner == at && !row.is_infrastructure;
+            let own = rows.iter().filter(is_own).map(|row| &row.shown);
+            *looks = Looks::made_of(own.clone().chain([&*looks]), |k| {
+                let is_there = own.clone().any(|shown| shown.at(k).is_some());
+                looks.at(k).filter(|_| is_there).cloned()
+            });
             if looks.distinct().is_empty() {
                 never.push(at);
             }
@@ -227,7 +197,7 @@ impl Drawn {
 
     /// Combines the two arrows of a box that both publishes and subscribes to a topic into one line, with a
     /// head at each end that is used.
-    pub(super) fn join_twins(&mut self) {
+    pub(crate) fn join_twins(&mut self) {
         let mut stays = ById::like(&self.arrows, true);
         for there in self.arrows.ids() {
             let (from, to) = (self.arrows[there].from, self.arrows[there].to);
@@ -263,14 +233,14 @@ impl Drawn {
     }
 
     /// Removes all other arrows and renumbers those that stay.
-    pub(super) fn keep_arrows(&mut self, stays: &ById<ArrowId, bool>) {
+    pub(crate) fn keep_arrows(&mut self, stays: &ById<ArrowId, bool>) {
         self.arrows.retain(|at| stays[at]);
         self.arrows_shown.retain(|at| stays[at]);
         renumber(&mut self.arrows_shown);
     }
 
     /// Removes all other boxes, to which no arrow may lead, and renumbers those that stay. Returns the new ids.
-    pub(super) fn keep_items(&mut self, stays: &ById<ItemId, bool>) -> ById<ItemId, ItemId> {
+    pub(crate) fn keep_items(&mut self, stays: &ById<ItemId, bool>) -> ById<ItemId, ItemId> {
         let mut next = 0;
         let place = |stays: &bool| {
             next += u32::from(*stays);
@@ -297,40 +267,27 @@ fn renumber(all: &mut [Looks]) {
 
 /// The looks of one line for both ways between a node and a topic.
 fn both_ways(ways: [&Looks; 2]) -> Looks {
-    let mut writer = LooksWriter::default();
-    let windows: BTreeSet<u32> = ways
-        .iter()
-        .flat_map(|way| way.runs())
-        .map(|run| run.0)
-        .collect();
-    for window in windows {
-        let looks = ways.map(|way| way.at(window as usize));
-        let is_reported = |look: &&&Shown| look.mark.is_some();
-        let look = looks
-            .iter()
-            .flatten()
-            .find(is_reported)
-            .or(looks.iter().flatten().next());
-        let events = looks.iter().flatten().flat_map(|look| &look.events);
-        let events: BTreeSet<_> = events.copied().collect();
-        let shown = look.map(|look| Shown {
-            events: events.into_iter().collect(),
-            topics: vec![TopicRow {
-                topic: 0,
-                ways: looks.map(|look| look.is_some()),
-                is_service: false,
-                is_starved: look.is_starved,
-                state: look.state,
-                hz: look.hz,
-                count: look.count,
-                mark: None,
-                rates: None,
-            }],
-            ..(*look).clone()
-        });
-        writer.show(window, shown);
-    }
-    writer.finish()
+    Looks::made_of(ways.into_iter(), |k| {
+        let looks = ways.map(|way| way.at(k));
+        let look = reported(looks.into_iter().flatten())?;
+        Some(Shown {
+            events: events(looks.into_iter().flatten()),
+            topics: vec![TopicRow::of(0, looks.map(|look| look.is_some()), look)],
+            ..look.clone()
+        })
+    })
+}
+
+/// The first of these looks; one with a mark takes precedence.
+fn reported<'a>(looks: impl Iterator<Item = &'a Shown> + Clone) -> Option<&'a Shown> {
+    let marked = looks.clone().find(|look| look.mark.is_some());
+    marked.or_else(|| looks.into_iter().next())
+}
+
+/// The events behind these looks, sorted.
+fn events<'a>(looks: impl Iterator<Item = &'a Shown>) -> Vec<EventId> {
+    let events: BTreeSet<EventId> = looks.flat_map(|look| &look.events).copied().collect();
+    events.into_iter().collect()
 }
 
 #[cfg(test)]

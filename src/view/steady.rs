@@ -1,7 +1,6 @@
-//! Stable looks without flicker: between two events of the log, an element keeps its state, the thickness for
-//! its rate, and its written number as long as the difference may be random.
+//! The look of an element over several windows, without flicker from window to window.
 
-use super::looks::{Looks, LooksWriter};
+use super::shown::{Looks, LooksWriter};
 use super::{Mark, Shown};
 use crate::base::time::Span;
 use crate::evidence::Confidence;

@@ -4,12 +4,12 @@
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-use super::{Frame, Mark, Phrase, SeenWindow, Shown, View};
 use crate::base::name::lies_in;
 use crate::base::words;
 use crate::graph::Element;
 use crate::mission::Mission;
 use crate::mission::event_log::{Event, EventId, Kind};
+use crate::view::{Frame, Mark, Phrase, SeenWindow, Shown, View};
 
 /// The most changes that have their own colour and their own words in the headline.
 const MOST: usize = 5;
@@ -31,7 +31,7 @@ pub struct Crowd {
 }
 
 /// Combines crowds in every window.
-pub(super) fn gather(view: &mut View, mission: &Mission) {
+pub(crate) fn gather(view: &mut View, mission: &Mission) {
     let mut frames = std::mem::take(&mut view.frames);
     for frame in &mut frames {
         let mut changes = changes(frame, view, mission);

@@ -1,22 +1,101 @@
-//! Options of a view that match nothing, and the error of a view that shows nothing at all, with the name
-//! that may have been meant.
+//! Notices about what the picture leaves out, about options that match nothing, and the error of a view that shows nothing.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::names::{is_params, is_tf};
+use super::choose::{Reason, is_params, is_tf};
+use super::items::Viewed;
 use super::{Hide, NameFilter, ViewOptions};
 use crate::base::error::Error;
 use crate::base::name::{is_within, namespace};
 use crate::base::nearest::nearest;
-use crate::base::notice::{Notice, NoticeKind};
+use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words;
 use crate::graph::{Elements, Topic};
 
+/// The largest number of names given as examples.
+const EXAMPLES: usize = 3;
+
+/// One notice per reason for hiding, with the number of elements hidden. Grouped and collapsed elements are seen as
+/// part of their box.
+pub(crate) fn notes(elements: &Elements, viewed: &Viewed<'_>, options: &ViewOptions) -> Notices {
+    let selection = &viewed.selection;
+    let reasons = selection.nodes.iter().chain(&selection.topics);
+    let mut hidden: BTreeMap<Reason, Vec<&str>> = BTreeMap::new();
+    for (name, reason) in names(elements).into_iter().flatten().zip(reasons) {
+        if let Some(reason) = reason {
+            hidden.entry(*reason).or_default().push(name);
+        }
+    }
+    let mut notices = Notices::new();
+    for (reason, mut names) in hidden {
+        names.sort_unstable();
+        names.dedup();
+        let (what, how) = words(reason);
+        let text = format!("{what} left out ({}): {how}", examples(&names));
+        add(&mut notices, names.len(), text);
+    }
+    if options.hide.unreachable {
+        let text = "nodes are left out of windows in which they are silent: `--hide` without `unreachable` shows them";
+        add(&mut notices, 1, text.to_owned());
+    }
+    if viewed.dropped > 0 {
+        let text =
+            "arrows from node to node left out, too many to read: `--mode all` shows the topics";
+        add(&mut notices, viewed.dropped, text.to_owned());
+    }
+    notices
+}
+
+fn add(notices: &mut Notices, count: usize, text: String) {
+    notices.add(Notice::counted(NoticeKind::Hidden, count as u64, text));
+}
+
+/// The words for the elements left out for a reason, and the option that shows them.
+fn words(reason: Reason) -> (&'static str, String) {
+    let (what, hidden) = match reason {
+        Reason::NsFilter => ("nodes outside `--ns-filter`", None),
+        Reason::TopicFilter => ("topics outside `--topic-filter`", None),
+        Reason::Orphan => ("topics without a node inside `--ns-filter`", None),
+        Reason::Leaf => ("topics with a single connection", Some("leaf")),
+        Reason::Dead => ("topics without a subscriber", Some("dead")),
+        Reason::Tf => ("transforms", Some("tf")),
+        Reason::Params => ("topics of parameters", Some("params")),
+        Reason::Services => ("services", Some("services")),
+        Reason::Debug => ("debugging elements", Some("debug")),
+        Reason::Quiet => ("housekeeping", Some("quiet")),
+        Reason::Recorder => ("recorder and player", Some("quiet")),
+    };
+    let how = match hidden {
+        None => "widen the filter to see them".to_owned(),
+        Some("quiet") => "`--hide none` shows them".to_owned(),
+        Some(word) => format!("`--hide` without `{word}` shows them"),
+    };
+    (what, how)
+}
+
+fn examples(names: &[&str]) -> String {
+    let mut list: Vec<String> = names
+        .iter()
+        .take(EXAMPLES)
+        .map(|n| words::shorten(n, 60).into_owned())
+        .collect();
+    if names.len() > EXAMPLES {
+        list.push("…".to_owned());
+    }
+    list.join(", ")
+}
+
+/// The names of all nodes, and of all topics.
+fn names(elements: &Elements) -> [Vec<&str>; 2] {
+    let nodes = elements.nodes.iter().map(|n| n.name.as_str());
+    let topics = elements.topics.iter().map(|t| t.name.as_str());
+    [nodes.collect(), topics.collect()]
+}
+
 /// The error of a view without any of these elements.
 pub(crate) fn nothing(elements: &Elements, options: &ViewOptions) -> Error {
-    let nodes: Vec<&str> = elements.nodes.iter().map(|n| n.name.as_str()).collect();
-    let topics: Vec<&str> = elements.topics.iter().map(|t| t.name.as_str()).collect();
+    let [nodes, topics] = names(elements);
     let filters = [
         ("--ns-filter", &options.ns_filter, &nodes),
         ("--topic-filter", &options.topic_filter, &topics),
@@ -48,8 +127,7 @@ pub(crate) fn none_pass(flag: &str, filter: &NameFilter, names: &[&str]) -> Opti
 
 /// Notices about the names and patterns in these options that match nothing.
 pub(crate) fn unmatched(elements: &Elements, options: &ViewOptions) -> Vec<Notice> {
-    let nodes: Vec<&str> = elements.nodes.iter().map(|n| n.name.as_str()).collect();
-    let topics: Vec<&str> = elements.topics.iter().map(|t| t.name.as_str()).collect();
+    let [nodes, topics] = names(elements);
     let both: Vec<&str> = nodes.iter().chain(&topics).copied().collect();
     let without = |spaces: &[Arc<str>]| -> Vec<String> {
         let is_used = |space: &&Arc<str>| {
@@ -59,45 +137,36 @@ pub(crate) fn unmatched(elements: &Elements, options: &ViewOptions) -> Vec<Notic
         let unused = spaces.iter().filter(|space| !is_used(space));
         unused.map(ToString::to_string).collect()
     };
-    let hide = options.hide;
-    let options = [
-        (
-            "--ns-filter",
-            "node",
-            options.ns_filter.unused(&nodes),
-            &nodes,
-        ),
-        (
-            "--topic-filter",
-            "topic",
-            options.topic_filter.unused(&topics),
-            &topics,
-        ),
-        ("--collapse", "name", without(&options.collapse), &both),
-        ("--collapse -", "name", without(&options.expand), &both),
+    let unused = options.ns_filter.unused(&nodes);
+    let mut notices = unmatched_by("--ns-filter", "node", &unused, &nodes);
+    notices.extend(unmatched_topics(&options.topic_filter, &topics));
+    let spaces = [
+        ("--collapse", &options.collapse),
+        ("--collapse -", &options.expand),
     ];
-    let unused = options.iter().flat_map(|(flag, what, unused, names)| {
-        let each = unused.iter();
-        each.map(|text| unused_text(flag, text, what, names))
-    });
-    unused.chain(not_hidden(elements, hide)).collect()
+    for (flag, spaces) in spaces {
+        notices.extend(unmatched_by(flag, "name", &without(spaces), &both));
+    }
+    notices.extend(not_hidden(elements, options.hide));
+    notices
 }
 
 /// Notices about the parts of a topic filter that match none of these names.
 pub(crate) fn unmatched_topics(filter: &NameFilter, names: &[&str]) -> Vec<Notice> {
-    let unused = filter.unused(names).into_iter();
-    unused
-        .map(|text| unused_text("--topic-filter", &text, "topic", names))
-        .collect()
+    unmatched_by("--topic-filter", "topic", &filter.unused(names), names)
 }
 
-fn unused_text(flag: &str, text: &str, what: &str, names: &[&str]) -> Notice {
-    let meant = meant(&[text.trim_start_matches('-')], names);
-    // A filter's syntax is not accepted for namespaces.
-    let meant = meant.split(": ").next().unwrap_or_default();
-    let space = if flag.ends_with('-') { "" } else { " " };
-    let text = format!("`{flag}{space}{text}` matches no {what}; {meant}");
-    Notice::new(NoticeKind::Note, text)
+/// Notices about the parts of an option that match none of these names.
+fn unmatched_by(flag: &str, what: &str, unused: &[String], names: &[&str]) -> Vec<Notice> {
+    let notice = |text: &String| {
+        let meant = meant(&[text.trim_start_matches('-')], names);
+        // A filter's syntax is not accepted for namespaces.
+        let meant = meant.split(": ").next().unwrap_or_default();
+        let space = if flag.ends_with('-') { "" } else { " " };
+        let text = format!("`{flag}{space}{text}` matches no {what}; {meant}");
+        Notice::new(NoticeKind::Note, text)
+    };
+    unused.iter().map(notice).collect()
 }
 
 /// Notices about kinds of topics to hide of which the mission has none.
@@ -159,7 +228,45 @@ fn meant(wanted: &[&str], names: &[&str]) -> String {
 mod tests {
     use super::*;
     use crate::view::testing::mission;
-    use crate::view::{NameFilter, outline};
+    use crate::view::{Hide, NameFilter, ViewOptions, outline, view};
+
+    /// The notices, each as `count text`.
+    fn reported(window: &str, options: &ViewOptions) -> Vec<String> {
+        let (_, notices) = view(&mission(&[window]), options);
+        notices
+            .iter()
+            .map(|n| format!("{} {}", n.count, n.text))
+            .collect()
+    }
+
+    #[test]
+    fn hidden_elements_are_reported() {
+        let window = "/a>/clock /a>/rosout /record_7</t /a>/t /b/x</t";
+        assert_eq!(
+            reported(window, &ViewOptions::default()),
+            [
+                "2 housekeeping left out (/clock, /rosout): `--hide none` shows them",
+                "1 recorder and player left out (/record_7): `--hide none` shows them",
+            ]
+        );
+        let all = ViewOptions {
+            hide: Hide::NONE,
+            ..ViewOptions::default()
+        };
+        assert!(reported(window, &all).is_empty());
+        let narrow = ViewOptions {
+            hide: Hide::NONE,
+            ns_filter: NameFilter::parse("/b/.*").unwrap(),
+            ..ViewOptions::default()
+        };
+        assert_eq!(
+            reported(window, &narrow),
+            [
+                "2 nodes outside `--ns-filter` left out (/a, /record_7): widen the filter to see them",
+                "2 topics without a node inside `--ns-filter` left out (/clock, /rosout): widen the filter to see them",
+            ]
+        );
+    }
 
     #[test]
     fn kinds_that_the_mission_lacks_are_reported() {

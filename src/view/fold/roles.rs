@@ -1,46 +1,56 @@
 //! Nodes by role: the runs of one anonymous node are one box, named without the part that differs from run to
 //! run.
+//!
+//! `/rviz_1700000000_1` ends before `/rviz_1700000000_2` begins: both are `/rviz`. Side by side they are `/rviz` and
+//! `/rviz ~2`.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::{Item, ItemKind};
+use super::{Fold, ItemKey};
 use crate::base::time::Stamp;
 use crate::evidence::Evidence;
-use crate::graph::{ById, Elements, Node, NodeId};
+use crate::graph::{Element, Elements, Node, NodeId};
+use crate::view::{Item, ItemKind};
 
-/// Per node of the mission, the name of its box: its role, if all nodes of that role existed one after the
-/// other.
-pub(crate) fn boxes(elements: &Elements) -> ById<NodeId, Arc<str>> {
-    let mut by_role: BTreeMap<&str, Vec<&Node>> = BTreeMap::new();
-    for node in elements.nodes.iter().filter(|n| is_anonymous(n)) {
-        by_role.entry(&node.role).or_default().push(node);
+/// The runs of each role whose nodes existed one after the other.
+pub(crate) fn folds(elements: &Elements) -> Vec<Fold> {
+    let mut by_role: BTreeMap<&Arc<str>, Vec<(NodeId, &Node)>> = BTreeMap::new();
+    for (id, node) in elements.nodes.with_ids().filter(|(_, n)| is_anonymous(n)) {
+        by_role.entry(&node.role).or_default().push((id, node));
     }
     by_role.retain(|role, runs| runs.len() > 1 && follow(runs) && !is_taken(elements, role));
-    let name = |node: &Node| {
-        let folded = is_anonymous(node) && by_role.contains_key(&*node.role);
-        if folded {
-            Arc::clone(&node.role)
-        } else {
-            node.name.shared()
-        }
-    };
-    elements.nodes.iter().map(name).collect()
+    let folds = by_role.into_iter().flat_map(|(role, runs)| {
+        runs.into_iter().map(|(id, _)| Fold {
+            what: Element::Node(id),
+            key: ItemKey {
+                kind: ItemKind::Node,
+                name: Arc::clone(role),
+            },
+        })
+    });
+    folds.collect()
 }
 
 /// Gives each node's box its role as a label, numbered if several of a role exist at once: `/rviz`, `/rviz
-/// ~2`.
+/// ~2`; and each box of unnamed publishers its question mark: `?`, `? ×3`.
 pub(crate) fn label(items: &mut [Item], elements: &Elements) {
-    let mut seen: BTreeMap<Arc<str>, usize> = BTreeMap::new();
     let mut order: Vec<(Stamp, usize, Arc<str>)> = Vec::new();
-    for (at, item) in items.iter().enumerate() {
-        let Some(node) = single_node(item, elements).filter(|n| is_anonymous(n)) else {
+    for (at, item) in items.iter_mut().enumerate() {
+        let Some(node) = single_node(item, elements) else {
             continue;
         };
-        let first = node.seen.first.unwrap_or(Stamp::MIN);
-        order.push((first, at, Arc::clone(&node.role)));
+        let mark = item.name.rfind('?');
+        let is_unknown = node.seen.evidence == Evidence::of("unknown");
+        if let Some(mark) = mark.filter(|_| is_unknown) {
+            item.label = item.name[mark..].into();
+        } else if is_anonymous(node) {
+            let first = node.seen.first.unwrap_or(Stamp::MIN);
+            order.push((first, at, Arc::clone(&node.role)));
+        }
     }
     order.sort();
+    let mut seen: BTreeMap<Arc<str>, usize> = BTreeMap::new();
     for (_, at, role) in order {
         let count = seen
             .entry(Arc::clone(&role))
@@ -53,21 +63,9 @@ pub(crate) fn label(items: &mut [Item], elements: &Elements) {
     }
 }
 
-/// Labels each box of unnamed publishers with its question mark as a label: `?`, `? ×3`.
-pub(crate) fn label_unknown(items: &mut [Item], elements: &Elements) {
-    for item in items {
-        let node = single_node(item, elements);
-        if node.is_some_and(|n| n.seen.evidence == Evidence::of("unknown"))
-            && let Some(mark) = item.name.rfind('?')
-        {
-            item.label = item.name[mark..].into();
-        }
-    }
-}
-
 fn single_node<'a>(item: &Item, elements: &'a Elements) -> Option<&'a Node> {
     match (item.kind, &item.members[..]) {
-        (ItemKind::Node, [crate::graph::Element::Node(id)]) => elements.nodes.get(*id),
+        (ItemKind::Node, [Element::Node(id)]) => elements.nodes.get(*id),
         _ => None,
     }
 }
@@ -82,10 +80,10 @@ fn is_taken(elements: &Elements, role: &str) -> bool {
 }
 
 /// Whether each run was last seen before the next was first seen.
-fn follow(runs: &mut [&Node]) -> bool {
-    runs.sort_by_key(|n| n.seen.first);
+fn follow(runs: &mut [(NodeId, &Node)]) -> bool {
+    runs.sort_by_key(|run| run.1.seen.first);
     runs.windows(2)
-        .all(|pair| match (pair[0].seen.last, pair[1].seen.first) {
+        .all(|pair| match (pair[0].1.seen.last, pair[1].1.seen.first) {
             (Some(last), Some(first)) => last < first,
             _ => false,
         })

@@ -1,0 +1,486 @@
+//! The marks of a window: the events of the event log in it, and those of earlier windows that last, by item and arrow.
+
+use std::collections::BTreeMap;
+
+use super::items::{Place, Viewed};
+use super::state::{LivingItems, Now};
+use super::{Arrow, ArrowId, ArrowKind, Counts, Headline, ItemId, ItemKind, Mark, Shown, TopicRow};
+use crate::base::time::{Span, Stamp};
+use crate::graph::Element;
+use crate::mission::EventLog;
+use crate::mission::event_log::{Detail, Event, EventId, Kind, Parts};
+
+/// The changes of an item or arrow in a window.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Changed {
+    /// Whether a part of it began, or ended.
+    pub(crate) came: bool,
+    pub(crate) went: bool,
+    /// Its mark if it existed before and still does.
+    pub(crate) mark: Option<Mark>,
+    /// Messages per second before and after.
+    pub(crate) rates: Option<(f64, f64)>,
+    /// The headlines behind the mark, sorted.
+    pub(crate) events: Vec<EventId>,
+}
+
+impl Changed {
+    /// As the end of an arrow.
+    pub(crate) fn as_end(&self) -> EndMark<'_> {
+        (self.mark, &self.events)
+    }
+}
+
+/// The changes of one window by the id of the item or arrow.
+#[derive(Default)]
+pub(crate) struct WindowMarks {
+    pub(crate) headlines: Vec<Headline>,
+    pub(crate) lasting: Vec<Lasting>,
+    pub(crate) items: BTreeMap<ItemId, Changed>,
+    pub(crate) arrows: BTreeMap<ArrowId, Changed>,
+}
+
+impl WindowMarks {
+    /// The changes of the window `span`, with the events of earlier windows that last. `parts` are the parts
+    /// of each headline; they are reported with it, whenever they happened. A start or appearance before
+    /// `beginning` is not a change.
+    pub(crate) fn new(
+        log: &EventLog,
+        (parts, beginning): (&Parts, Option<Stamp>),
+        (span, lasting): (Span, Vec<Lasting>),
+        viewed: &Viewed<'_>,
+    ) -> Self {
+        let mut changed = Self::default();
+        for last in &lasting {
+            if let Some(event) = log.events.get(last.event) {
+                changed.report(viewed, event, last.event, last.part());
+            }
+        }
+        changed.lasting = lasting;
+        for (id, event) in log.headlines(span) {
+            let is_start = matches!(event.kind, Kind::Started | Kind::Appeared);
+            let is_first = is_start && beginning.is_some_and(|end| event.time < end);
+            if is_first || !viewed.sees(event.what) {
+                continue;
+            }
+            changed.headlines.push(Headline {
+                event: id,
+                kind: event.kind,
+                what: event.what,
+                time: event.time,
+            });
+            changed.report(viewed, event, id, Part::of(event, span));
+            // A return has its own mark.
+            let parts = parts.get(&id).filter(|_| event.kind != Kind::Restarted);
+            for part in parts.into_iter().flatten() {
+                if let Some(part) = log.events.get(*part) {
+                    changed.report(viewed, part, id, Part::Whole);
+                }
+            }
+        }
+        changed
+    }
+
+    fn report(&mut self, viewed: &Viewed<'_>, event: &Event, headline: EventId, part: Part) {
+        let sign = EventSign::of(event, headline, part);
+        self.add(viewed, event.what, &sign);
+        match (&event.detail, event.what) {
+            (Detail::Senders { from, to }, Element::Topic(topic)) => {
+                for node in from.iter().chain(to) {
+                    if let Some(edge) = viewed.elements.published((*node, topic)) {
+                        self.add_carriers(viewed, edge, &sign);
+                    }
+                }
+            }
+            (Detail::Rates { .. }, Element::Publish(_)) => {
+                self.add_carriers(viewed, event.what, &sign);
+                let topic = viewed.elements.ends(event.what).1.map(Element::Topic);
+                if let Some(topic) = topic.filter(|t| viewed.has_single_sender(*t)) {
+                    self.add(viewed, topic, &sign);
+                }
+            }
+            (Detail::Rates { .. }, Element::Topic(_))
+                if viewed.has_single_sender(event.what) || !viewed.pairs.is_empty() =>
+            {
+                self.add_carriers(viewed, event.what, &sign);
+            }
+            _ => {}
+        }
+    }
+
+    fn add(&mut self, viewed: &Viewed<'_>, what: Element, sign: &EventSign) {
+        if !viewed.pairs.is_empty() && what.is_edge() {
+            self.add_carriers(viewed, what, sign);
+        }
+        match viewed.place(what) {
+            Place::Item(id) => sign.keep(&mut self.items, id, Reach::of_item(viewed, id)),
+            Place::Inside(id) => sign.keep(&mut self.items, id, Reach::Inside),
+            Place::Arrow(id) => {
+                sign.keep(&mut self.arrows, id, Reach::of_arrow(viewed, id));
+            }
+            Place::Hidden => {}
+        }
+    }
+
+    /// Marks the arrows that carry a topic or publication.
+    fn add_carriers(&mut self, viewed: &Viewed<'_>, what: Element, sign: &EventSign) {
+        for id in viewed.carriers(what) {
+            sign.keep(&mut self.arrows, *id, Reach::of_arrow(viewed, *id));
+        }
+    }
+}
+
+/// The relation of the element of an event to its box or arrow.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Reach {
+    /// It is the only one in it.
+    Whole,
+    /// One of several that are drawn as one, with their rates summed.
+    Part,
+    /// Somewhere inside a collapsed namespace.
+    Inside,
+}
+
+impl Reach {
+    fn of_item(viewed: &Viewed<'_>, id: ItemId) -> Self {
+        match viewed.items.get(id) {
+            Some(item) if item.kind == ItemKind::Namespace => Self::Inside,
+            Some(item) if item.is_replica => Self::Part,
+            // Runs of one node, of which one exists at a time.
+            Some(item) if item.kind == ItemKind::Node => Self::Whole,
+            Some(item) if item.members.len() > 1 => Self::Part,
+            _ => Self::Whole,
+        }
+    }
+
+    fn of_arrow(viewed: &Viewed<'_>, id: ArrowId) -> Self {
+        let members = viewed.arrows.get(id).map_or(0, |a| a.members.len());
+        let is_role = |id: ItemId| {
+            let item = viewed.items.get(id);
+            item.is_some_and(|i| i.kind == ItemKind::Node && i.members.len() > 1 && !i.is_replica)
+        };
+        let ends = viewed.arrows.get(id).map(|a| [a.from, a.to]);
+        let topics = ends.is_some_and(|ends| ends.into_iter().any(is_role));
+        let members = if topics { 1 } else { members };
+        let joined = viewed.pairs.get(id).map_or(members, Vec::len);
+        if joined > 1 { Self::Part } else { Self::Whole }
+    }
+}
+
+/// The effect of one event on the item or arrow that it is reported on.
+struct EventSign {
+    kind: Kind,
+    part: Part,
+    rates: Option<(f64, f64)>,
+    headline: EventId,
+}
+
+impl EventSign {
+    fn of(event: &Event, headline: EventId, part: Part) -> Self {
+        Self {
+            kind: event.kind,
+            part,
+            rates: match event.detail {
+                Detail::Rates { from_hz, to_hz } => Some((from_hz, to_hz)),
+                _ => None,
+            },
+            headline,
+        }
+    }
+
+    /// The mark on an element that existed before and still does.
+    fn mark(&self, reach: Reach) -> Option<Mark> {
+        let is_faster = self.rates.is_some_and(|(from, to)| to > from);
+        match (self.part, reach) {
+            (_, Reach::Part | Reach::Inside) | (Part::Whole, _) => {}
+            (Part::Leaves, Reach::Whole) => return Some(Mark::Removed),
+            (Part::Away, Reach::Whole) => return Some(Mark::Away),
+            (Part::Back, Reach::Whole) => return Some(Mark::Restarted),
+        }
+        match (self.kind, reach) {
+            (Kind::Rate, Reach::Whole | Reach::Part) if is_faster => Some(Mark::Faster),
+            (Kind::Rate, Reach::Whole | Reach::Part) => Some(Mark::Slower),
+            (_, Reach::Part | Reach::Inside) => Some(Mark::Inside),
+            (Kind::Restarted, _) => Some(Mark::Restarted),
+            (Kind::Silent, _) => Some(Mark::Paused),
+            (Kind::HandedOver, _) => Some(Mark::HandedOver),
+            (kind, _) if kind.is_remark() => Some(Mark::Changed),
+            (Kind::Lifecycle | Kind::Type | Kind::Qos, _) => Some(Mark::Changed),
+            _ => None,
+        }
+    }
+
+    /// Records the event for an item or arrow; of several marks on the same one, the most informative one
+    /// stays.
+    fn keep<I: Ord>(&self, all: &mut BTreeMap<I, Changed>, id: I, reach: Reach) {
+        let reported = all.entry(id).or_default();
+        reported.came |= matches!(self.kind, Kind::Started | Kind::Appeared);
+        reported.went |= matches!(self.kind, Kind::Stopped | Kind::Vanished);
+        if let Err(place) = reported.events.binary_search(&self.headline) {
+            reported.events.insert(place, self.headline);
+        }
+        let mark = self.mark(reach);
+        if mark.map(weight) > reported.mark.map(weight) {
+            reported.mark = mark;
+            reported.rates = self.rates.filter(|_| reach == Reach::Whole);
+        }
+    }
+}
+
+fn weight(mark: Mark) -> u8 {
+    match mark {
+        Mark::Removed => 5,
+        Mark::HandedOver | Mark::Restarted => 4,
+        Mark::Paused => 3,
+        Mark::Changed => 2,
+        Mark::Inside | Mark::Away => 1,
+        Mark::Faster | Mark::Slower | Mark::Added | Mark::Gone => 0,
+    }
+}
+
+/// The items and arrows that exist before and after a window, and the changes in between.
+#[derive(Default)]
+pub(crate) struct WindowChanges {
+    pub(crate) before: LivingItems,
+    pub(crate) after: LivingItems,
+    pub(crate) marks: WindowMarks,
+}
+
+/// The mark of an end of an arrow, and the events behind it.
+pub(crate) type EndMark<'a> = (Option<Mark>, &'a [EventId]);
+
+impl WindowChanges {
+    /// The look of an item; `there` is whether it exists before and after.
+    pub(crate) fn item(
+        &self,
+        (viewed, now): (&Viewed<'_>, &Now<'_>),
+        id: ItemId,
+        there: (bool, bool),
+    ) -> Option<Shown> {
+        let mut shown = marked(now.item(id)?, there, self.marks.items.get(&id))?;
+        if viewed.items[id].kind == ItemKind::Namespace {
+            shown.inside = self.inside(&shown);
+        }
+        Some(shown)
+    }
+
+    /// The look of an arrow, which appears and vanishes with its ends, unless it has events of its own.
+    pub(crate) fn arrow(
+        &self,
+        (viewed, now): (&Viewed<'_>, &Now<'_>),
+        id: ArrowId,
+        there: (bool, bool),
+        ends: [Option<EndMark<'_>>; 2],
+    ) -> Option<Shown> {
+        let arrow = viewed.arrows.get(id)?;
+        let shown = now.arrow(id)?;
+        let reported = self.marks.arrows.get(&id).cloned();
+        let reported = reported.or_else(|| with_ends(there, ends));
+        let mut shown = marked(shown, there, reported.as_ref())?;
+        if arrow.kind == ArrowKind::Bundle {
+            shown.inside = self.inside(&shown);
+            self.mark_topics((viewed, now), arrow, &mut shown);
+        }
+        Some(shown)
+    }
+
+    /// Marks the topics of a bundle, unless it appeared or vanished as a whole.
+    fn mark_topics(
+        &self,
+        (viewed, now): (&Viewed<'_>, &Now<'_>),
+        arrow: &Arrow,
+        shown: &mut Shown,
+    ) {
+        if shown.mark.is_none_or(|mark| mark.class() != "changed") {
+            return;
+        }
+        let lives = |items: &LivingItems, row: &TopicRow| {
+            let all = items.topics.get(ArrowId(shown.id));
+            all.and_then(|all| all.get(row.topic as usize)) == Some(&true)
+        };
+        for row in &mut shown.topics {
+            let there = (lives(&self.before, row), lives(&self.after, row));
+            match there {
+                (false, true) => row.mark = Some(Mark::Added),
+                (true, false) => row.mark = Some(Mark::Removed),
+                _ => {
+                    let name = &arrow.topics[row.topic as usize];
+                    for event in shown.events.iter().filter_map(|id| now.event(*id)) {
+                        let topic = viewed.elements.ends(event.what).1;
+                        if topic.is_some_and(|topic| viewed.bundled[topic] == *name) {
+                            (row.mark, row.rates) = changed(event);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// The number of headlines reported on a collapsed namespace or a bundle; `None` without any.
+    fn inside(&self, shown: &Shown) -> Option<Box<Counts>> {
+        let reported = self.marks.headlines.iter();
+        let counts = Counts::of(reported.filter(|h| shown.events.binary_search(&h.event).is_ok()));
+        (counts.total() > 0).then(|| Box::new(counts))
+    }
+}
+
+/// The mark of a topic of a bundle for an event, with its rates before and after.
+fn changed(event: &Event) -> (Option<Mark>, Option<(f64, f64)>) {
+    match (event.kind, &event.detail) {
+        (_, Detail::Rates { from_hz, to_hz }) => {
+            let mark = if to_hz > from_hz {
+                Mark::Faster
+            } else {
+                Mark::Slower
+            };
+            (Some(mark), Some((*from_hz, *to_hz)))
+        }
+        (Kind::HandedOver, _) => (Some(Mark::HandedOver), None),
+        (Kind::Silent, _) => (Some(Mark::Paused), None),
+        _ => (Some(Mark::Changed), None),
+    }
+}
+
+/// The changes of an arrow that follow from the marks of its ends and their events; `there` is whether it
+/// exists before and after.
+fn with_ends(there: (bool, bool), ends: [Option<EndMark<'_>>; 2]) -> Option<Changed> {
+    let marks: &[Mark] = match there {
+        // A node may return with other lines.
+        (false, true) => &[Mark::Added, Mark::Restarted],
+        (_, false) => &[Mark::Removed, Mark::Restarted],
+        // Lines stay, dotted, while one of their ends is away.
+        (true, true) => &[Mark::Removed, Mark::Away],
+    };
+    let of = |mark: Option<Mark>| mark.filter(|mark| marks.contains(mark));
+    let mut ends = ends.into_iter().flatten();
+    let (mark, events) = ends.find_map(|(mark, all)| Some((of(mark)?, all)))?;
+    Some(Changed {
+        came: there == (false, true),
+        went: !there.1 || mark == Mark::Removed,
+        mark: Some(mark).filter(|_| there == (true, true)),
+        events: events.to_vec(),
+        ..Changed::default()
+    })
+}
+
+/// The look of an item or arrow that exists before, after, or both; `None` for one that ended without an
+/// event.
+fn marked(shown: Shown, there: (bool, bool), reported: Option<&Changed>) -> Option<Shown> {
+    let Some(reported) = reported else {
+        return there.1.then_some(shown);
+    };
+    let mark = match there {
+        (false, true) if reported.came => Some(Mark::Added),
+        (_, false) if reported.went => Some(Mark::Removed),
+        // It ended and began within one window.
+        (true, true) if reported.came && reported.went => reported.mark.or(Some(Mark::Restarted)),
+        // One of several that are drawn as one.
+        (true, true) if reported.came || reported.went => reported.mark.or(Some(Mark::Inside)),
+        _ => reported.mark,
+    };
+    Some(Shown {
+        mark,
+        rates: reported
+            .rates
+            .filter(|_| matches!(mark, Some(Mark::Faster | Mark::Slower))),
+        events: reported.events.clone(),
+        ..shown
+    })
+}
+
+/// An event of an earlier window that lasts into this one or ends in it: a node is away, or an element is
+/// back.
+///
+/// A silence without evidence of an absence is only listed where it ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lasting {
+    /// Its index in the event log.
+    pub event: EventId,
+    /// The element it is about.
+    pub what: Element,
+    /// Its beginning.
+    pub since: Stamp,
+    /// Its end, if it lies in this window.
+    pub ended: Option<Stamp>,
+}
+
+/// The part of an event that a window shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// All of it that is drawn.
+    Whole,
+    /// A node leaves and returns in a later window.
+    Leaves,
+    /// A node is away during the whole window.
+    Away,
+    /// A node or topic is back.
+    Back,
+}
+
+impl Part {
+    /// The part of an event that lies in the window in which it begins.
+    pub(crate) fn of(event: &Event, window: Span) -> Self {
+        let leaves = event.kind == Kind::Restarted && event.until.is_some_and(|t| t >= window.end);
+        if leaves { Self::Leaves } else { Self::Whole }
+    }
+}
+
+impl Lasting {
+    pub(crate) fn part(&self) -> Part {
+        if self.ended.is_some() {
+            Part::Back
+        } else {
+            Part::Away
+        }
+    }
+}
+
+/// The events that last, from window to window.
+pub(crate) struct LastingEvents<'a> {
+    /// Those with an end, in the order of their beginnings.
+    all: Vec<(EventId, &'a Event)>,
+    /// The first of them that begins in or after the present window.
+    next: usize,
+    /// The indices of those that began before it and do not end before it.
+    open: Vec<usize>,
+}
+
+impl<'a> LastingEvents<'a> {
+    pub(crate) fn new(log: &'a EventLog, viewed: &Viewed<'_>) -> Self {
+        let lasts = |event: &Event| {
+            event.until.is_some_and(|until| until > event.time)
+                && event.is_headline()
+                && viewed.sees(event.what)
+        };
+        let all = log.events.with_ids().filter(|(_, event)| lasts(event));
+        Self {
+            all: all.collect(),
+            next: 0,
+            open: Vec::new(),
+        }
+    }
+
+    /// Those that last into a window or end in it. Windows are in the order of their starts.
+    pub(crate) fn at(&mut self, window: Span) -> Vec<Lasting> {
+        let begun = |at: usize| self.all.get(at).is_some_and(|e| e.1.time < window.start);
+        while begun(self.next) {
+            self.open.push(self.next);
+            self.next += 1;
+        }
+        let all = &self.all;
+        let end = |at: usize| all[at].1.until.unwrap_or(window.start);
+        self.open.retain(|at| end(*at) >= window.start);
+        let lasting = self.open.iter().filter_map(|at| {
+            let (id, event) = all[*at];
+            let ended = Some(end(*at)).filter(|end| *end < window.end);
+            let is_reported = ended.is_some() || event.kind == Kind::Restarted;
+            is_reported.then_some(Lasting {
+                event: id,
+                what: event.what,
+                since: event.time,
+                ended,
+            })
+        });
+        lasting.collect()
+    }
+}
