@@ -154,6 +154,8 @@ pub struct Item {
     pub label: Arc<str>,
     /// The nodes and topics it represents, sorted; one for a plain node or topic.
     pub members: Vec<Element>,
+    /// The names of its other nodes, sorted, if several that are alike share the box.
+    pub others: Vec<Arc<str>>,
     /// Whether its members are the counterparts of each other in several equal namespaces.
     pub is_replica: bool,
     /// Whether it is a service: its clients write to it, and its server reads it.

@@ -127,6 +127,9 @@ impl Fitting<'_> {
             self.again();
             self.take_higher_page();
         }
+        if !self.is_readable() && self.options.is_still == Some(true) {
+            self.join_alike();
+        }
         if !self.is_readable() {
             self.options.are_leaves_in_words = true;
             self.again();
@@ -140,6 +143,14 @@ impl Fitting<'_> {
             self.bundle();
         }
         self.take_lower_page();
+    }
+
+    /// One box for the nodes of a namespace that are there in the same phases.
+    fn join_alike(&mut self) {
+        let phases = self.mission.log.phases.iter().map(|phase| phase.span);
+        self.options.alike_in = phases.collect();
+        self.again();
+        self.take_higher_page();
     }
 
     /// Takes the lowest page of a purpose on which everything is legible, else the one with the largest text.

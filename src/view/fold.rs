@@ -2,9 +2,11 @@
 //!
 //! In come the elements of a mission, the choice of those that are drawn, and the options; out comes the box of each node
 //! and topic. [`boxes`] is the list of rules in their order, and the place to begin: `roles` (runs of one node), `topics`
-//! (actions, images, transforms), `equal` (robots of a fleet), `namespaces` (collapsed ones). Two rules need the looks of
+//! (actions, images, transforms), `equal` (robots of a fleet), `alike` (nodes that are there in the same phases),
+//! `namespaces` (collapsed ones). Two rules need the looks of
 //! the drawn boxes: `rows` (topics as rows of boxes) and `crowded` (changes as one coloured frame).
 
+pub(crate) mod alike;
 pub(crate) mod crowded;
 pub(crate) mod equal;
 pub(crate) mod namespaces;
@@ -62,6 +64,10 @@ impl Boxes<'_> {
         let mut folds = self.fleets.folds(&keys);
         folds.retain(|fold| fold.what.is_node() || !is_direct);
         apply(&mut keys, folds);
+        if !self.options.alike_in.is_empty() {
+            let folds = alike::folds(self.elements, &self.options.alike_in, &keys);
+            apply(&mut keys, folds);
+        }
         let folds = self.collapsed(&keys);
         apply(&mut keys, folds);
         if is_direct {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::choose::{Selection, finish, is_debug_label, select};
 use super::fold::equal::Fleets;
 use super::fold::topics::{self, Groups};
-use super::fold::{Boxes, ItemKey, roles};
+use super::fold::{Boxes, ItemKey, alike, roles};
 use super::listed::{self, Words};
 use super::{Arrow, ArrowId, ArrowKind, Grouping, Item, ItemId, ItemKind, Mode, ViewOptions};
 use crate::graph::{ById, Edge, EdgeId, Element, Elements, Id as _, PerElement, TopicId};
@@ -138,6 +138,7 @@ impl<'a> Viewed<'a> {
                 kind: *kind,
                 name: Arc::clone(name),
                 label: Arc::clone(name),
+                others: Vec::new(),
                 is_replica: *kind != ItemKind::Namespace && self.fleets.has(name),
                 is_service: members.iter().all(|(_, what)| elements.is_service(*what)),
                 cluster: None,
@@ -145,6 +146,15 @@ impl<'a> Viewed<'a> {
             });
             for (_, what) in members {
                 self.set_place(*what, Place::Item(id));
+            }
+        }
+        if !options.alike_in.is_empty() {
+            for item in self
+                .items
+                .iter_mut()
+                .filter(|item| item.kind == ItemKind::Node)
+            {
+                item.others = alike::others(elements, &item.name, &item.members);
             }
         }
         if !options.exact_names {

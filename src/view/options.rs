@@ -5,6 +5,7 @@ use std::sync::Arc;
 use regex::Regex;
 
 use crate::base::error::{Error, Result};
+use crate::base::time::Span;
 use crate::base::words::worded;
 
 worded! {
@@ -198,6 +199,8 @@ pub struct ViewOptions {
     pub(crate) is_bundled: bool,
     /// Whether all windows are drawn as one, in which nothing changes; `None` for a mission with a single window.
     pub(crate) is_still: Option<bool>,
+    /// The phases in which nodes of one namespace must be alike to share a box; none if each has its own.
+    pub(crate) alike_in: Vec<Span>,
     /// Whether bundles also list nodes that never change as words if they have a single line.
     pub(crate) are_leaves_in_words: bool,
     /// Whether anonymous nodes are drawn under their full names, with a box for each run.

@@ -5,7 +5,7 @@ use super::measured::{LINE, Label, ShownRates, rate_label, second_line};
 use super::options::{self, BoxLook};
 use super::page::GraphFit;
 use super::spaces::Space;
-use super::{badge, presence, texts};
+use super::{badge, texts};
 use crate::base::geometry::{Point, Rect};
 use crate::draw::scene::{Anchor, Form, Group, Piece, Shape, Stroke, Text, polygon};
 use crate::draw::style::{Body, Color, Style};
@@ -252,6 +252,7 @@ impl Boxes<'_> {
         let (scale, radius) = (self.fit.scale, body.radius * self.fit.scale);
         match item.kind {
             _ if item.is_service => hexagon(place, radius.max(body.pad_x * scale)),
+            ItemKind::Node if !item.others.is_empty() => Form::Rect(place, radius),
             ItemKind::Node if body.is_capsule() => Form::Rect(place, place.w.min(place.h) / 2.0),
             ItemKind::Node => Form::Ellipse(place),
             _ => Form::Rect(place, radius),
@@ -330,12 +331,8 @@ impl Boxes<'_> {
     ) {
         let scale = self.fit.scale;
         let middle = place.centre();
-        let mut small = if label.second { body.small * LINE } else { 0.0 };
-        if label.has_bar {
-            small += presence::room(body.size);
-        }
         // A line that is missing in this window keeps its space, so that the name does not move.
-        let top = middle.y - (body.size * LINE + small) * scale / 2.0;
+        let mut top = middle.y - label.height(body) * scale / 2.0;
         let line = |y: f64, size: f64, weight, color, text: &str| Text {
             at: Point::new(middle.x, y),
             anchor: Anchor::Middle,
@@ -347,6 +344,11 @@ impl Boxes<'_> {
         };
         let y = top + body.size * (LINE / 2.0 + 0.35) * scale;
         group.text(line(y, body.size, body.weight(), look.text, &label.name));
+        for other in &label.others {
+            top += body.size * LINE * scale;
+            let y = top + body.size * (LINE / 2.0 + 0.35) * scale;
+            group.text(line(y, body.size, Weight::Regular, look.text, other));
+        }
         let y = top + (body.size * LINE + body.small * (LINE / 2.0 + 0.28)) * scale;
         let (weight, color) = look.small;
         group.text(line(y, body.small, weight, color, second));

@@ -8,6 +8,7 @@ use super::{options, presence, replicas, texts, topics};
 use std::collections::BTreeSet;
 
 use crate::base::geometry::Size;
+use crate::base::name::namespace;
 use crate::base::words;
 use crate::draw::style::{Body, Style};
 use crate::draw::text::{Fonts, Weight};
@@ -19,6 +20,8 @@ use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Looks, Show
 /// The largest width of a name in pixels, and in heights of its letters if these are large; longer ones are shortened in
 /// their middle.
 const WIDEST: (f64, f64) = (230.0, 16.4);
+/// The most names below the first in a box; the others are counted.
+const MOST_OTHERS: usize = 5;
 /// The height of a line of text, relative to its font size.
 pub(crate) const LINE: f64 = 1.22;
 /// The height of a rate label, and its width beyond its text, relative to the font size.
@@ -35,6 +38,8 @@ const FLAT: f64 = 0.7;
 pub(crate) struct Label {
     /// The name as drawn.
     pub(crate) name: String,
+    /// The names of other nodes in the box, below it.
+    pub(crate) others: Vec<String>,
     /// Whether a smaller line is drawn below it in some window.
     pub(crate) second: bool,
     /// Whether a bar of the times at which it was there is drawn below it.
@@ -44,6 +49,22 @@ pub(crate) struct Label {
 }
 
 impl Label {
+    /// The height of all its lines in pixels before scaling, with the bar below them.
+    pub(crate) fn height(&self, body: &Body) -> f64 {
+        let bar = if self.has_bar {
+            presence::room(body.size)
+        } else {
+            0.0
+        };
+        self.lines(body) + bar
+    }
+
+    /// The height of its lines without the bar.
+    pub(crate) fn lines(&self, body: &Body) -> f64 {
+        let small = if self.second { body.small * LINE } else { 0.0 };
+        body.size * LINE * (1 + self.others.len()) as f64 + small
+    }
+
     /// The smaller line of a topic in a window without a message.
     pub(crate) fn silence(&self, shown: &Shown, shown_rates: ShownRates) -> &'static str {
         match shown.state {
@@ -102,7 +123,7 @@ impl MeasuredGraph {
             }
             vertices.push(Vertex {
                 size,
-                outline: outline(item, has_rows, style),
+                outline: outline(item, has_rows || !item.others.is_empty(), style),
                 cluster: item.cluster,
             });
             labels.push(label);
@@ -219,8 +240,28 @@ impl Measurer<'_> {
             };
         }
         let widest = WIDEST.0.max(WIDEST.1 * body.size);
+        let fit = |name: &str, weight| {
+            let fitted = self.fonts.fit(name, body.size, weight, widest);
+            fitted.into_owned()
+        };
+        let named = item.others.len().min(MOST_OTHERS);
+        let others = item.others.iter().take(named).map(|other| {
+            // Below a name with its namespace, one without it is in the same.
+            let inside = if inside.is_empty() {
+                namespace(&item.label)
+            } else {
+                inside
+            };
+            let other = self.fonts.shown(short_name(other, inside)).into_owned();
+            fit(&other, Weight::Regular)
+        });
+        let mut others: Vec<String> = others.collect();
+        if item.others.len() > named {
+            others.push(format!("+{} more", item.others.len() - named));
+        }
         Label {
-            name: (self.fonts.fit(&name, body.size, body.weight(), widest)).into_owned(),
+            name: fit(&name, body.weight()),
+            others,
             second,
             has_bar: false,
             unshown,
@@ -232,16 +273,12 @@ impl Measurer<'_> {
     fn size(&self, item: &Item, label: &Label, second: f64, has_rows: bool) -> Size {
         let body = options::body(self.style, item.kind);
         let width = self.fonts.width(&label.name, body.size, body.weight());
-        let width = width.max(second);
-        let small = if label.second { body.small * LINE } else { 0.0 };
-        let bar = if label.has_bar {
-            presence::room(body.size)
-        } else {
-            0.0
-        };
-        let height = body.size * LINE + small + bar;
+        let others = label.others.iter();
+        let others = others.map(|name| self.fonts.width(name, body.size, Weight::Regular));
+        let width = others.fold(width.max(second), f64::max);
+        let height = label.height(body);
         let depth = match item.kind {
-            ItemKind::Node if has_rows => 0.0,
+            ItemKind::Node if has_rows || !label.others.is_empty() => 0.0,
             ItemKind::Node if body.is_capsule() => {
                 let high = height + 2.0 * body.pad_y * FLAT;
                 return Size::new((width + 1.7 * body.pad_x).max(high), high);

@@ -2,7 +2,6 @@
 //! starts, ends and restarts as ticks.
 
 use super::boxes::{Boxes, ItemBox};
-use super::measured::LINE;
 use super::options;
 use crate::base::geometry::{Point, Rect};
 use crate::draw::scene::{Form, Group, Shape, Stroke, line};
@@ -47,13 +46,7 @@ impl Boxes<'_> {
             body.pad_x
         } * scale;
         // Below the name and the smaller line, where `Boxes::lines` leaves room.
-        let small = if card.label.second {
-            body.small * LINE
-        } else {
-            0.0
-        };
-        let lines = body.size * LINE + small;
-        let middle = place.centre().y + lines / 2.0 * scale;
+        let middle = place.centre().y + card.label.lines(body) / 2.0 * scale;
         let bar = Rect::new(
             place.x + aside,
             middle - high / 2.0,

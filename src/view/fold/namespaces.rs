@@ -388,6 +388,7 @@ mod tests {
             kind: ItemKind::Node,
             name: Arc::from(*name),
             label: Arc::from(*name),
+            others: Vec::new(),
             members: Vec::new(),
             is_replica: false,
             is_service: false,

@@ -1,0 +1,63 @@
+//! Nodes that are there in the same phases: those of one namespace are one box with all their names, where a still has no
+//! room for a box each. It hides no change, since they start and stop together.
+//!
+//! `/robot1/planner`, `/robot1/costmap` and `/robot1/controller` run while robot 1 navigates: one box with three names.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::{Fold, ItemKey, Keys, of};
+use crate::base::name::namespace;
+use crate::base::time::Span;
+use crate::graph::{Element, Elements};
+use crate::view::ItemKind;
+
+/// The nodes that move to the box of the first of those that are alike in these phases.
+pub(crate) fn folds(elements: &Elements, phases: &[Span], keys: &Keys) -> Vec<Fold> {
+    let mut alike: BTreeMap<(&str, Vec<bool>), Vec<Element>> = BTreeMap::new();
+    for id in elements.nodes.ids() {
+        let what = Element::Node(id);
+        // Nodes outside of all namespaces have nothing else in common.
+        let is_inside = |key: &&ItemKey| key.kind == ItemKind::Node && namespace(&key.name) != "/";
+        if let Some(key) = of(keys, what).filter(is_inside) {
+            let lives = &elements.seen(what).lives;
+            let there = phases.iter().map(|phase| fills(lives, *phase)).collect();
+            alike
+                .entry((namespace(&key.name), there))
+                .or_default()
+                .push(what);
+        }
+    }
+    let folds = alike.into_values().flat_map(|nodes| {
+        let first = nodes.first().and_then(|what| of(keys, *what)).cloned();
+        let fold = move |what| {
+            Some(Fold {
+                what,
+                key: ItemKey::clone(first.as_ref()?),
+            })
+        };
+        nodes.into_iter().filter_map(fold)
+    });
+    folds.collect()
+}
+
+/// Whether these lives take at least half of a phase.
+fn fills(lives: &[Span], phase: Span) -> bool {
+    let inside = lives.iter().map(|life| {
+        let (start, end) = (life.start.max(phase.start), life.end.min(phase.end));
+        end.since(start).max(0)
+    });
+    inside.sum::<i64>() >= phase.nanos() / 2
+}
+
+/// The names of the nodes in a box beside its own, without those of runs of the same node.
+pub(crate) fn others(elements: &Elements, name: &Arc<str>, members: &[Element]) -> Vec<Arc<str>> {
+    let roles = members.iter().filter_map(|what| match what {
+        Element::Node(id) => elements.nodes.get(*id).map(|node| Arc::clone(&node.role)),
+        _ => None,
+    });
+    let mut roles: Vec<Arc<str>> = roles.filter(|role| role != name).collect();
+    roles.sort_unstable();
+    roles.dedup();
+    roles
+}
