@@ -11,7 +11,7 @@ use crate::base::time::Span;
 use crate::base::words;
 use crate::graph::NodeId;
 use crate::mission::EventId;
-use crate::mission::event_log::{Event, Kind};
+use crate::mission::event_log::Event;
 
 /// The part of the mission, one in this many, up to which starts count as one burst of the staircase.
 const BURST: i64 = 66;
@@ -34,8 +34,8 @@ pub(crate) fn by_namespace(rows: Vec<Row>, whole: Span, is_folded: bool) -> Vec<
     let givers: BTreeSet<NodeId> = givers.filter_map(|mark| mark.from).collect();
     let is_fixed = |row: &Row| {
         let is_marked = row.marks.iter().any(|mark| mark.sign != Sign::Start);
-        let gives = row.nodes.iter().any(|id| givers.contains(id));
-        !is_marked && !gives && is_throughout(row, whole)
+        let is_giver = row.nodes.iter().any(|id| givers.contains(id));
+        !is_marked && !is_giver && is_throughout(row, whole)
     };
     let many = rows.len();
     let mut spaces: BTreeMap<String, Vec<Row>> = BTreeMap::new();
@@ -113,9 +113,9 @@ fn staircase(mut rows: Vec<Row>, whole: Span) -> Vec<Row> {
     rows.sort_by_key(Row::start);
     let (near, grid) = (whole.nanos() / BURST, (whole.nanos() / NEAR).max(1));
     // Elements that never end come first.
-    let end = |row: &Row| match row.is_ending() {
-        true => row.end().since(whole.start) / grid,
-        false => i64::MAX,
+    let end = |row: &Row| {
+        let at = row.end().since(whole.start) / grid;
+        if row.is_ending() { at } else { i64::MAX }
     };
     let close = |a: &Row, b: &Row| b.start().since(a.start()) <= near;
     for burst in rows.chunk_by_mut(close) {
@@ -230,13 +230,6 @@ fn unplaced(source: &FigureSource<'_>, rows: &[Row]) -> Vec<RowMark> {
     let parts = source.mission.log.all_parts();
     let all = source.mission.log.headlines(source.span());
     let others = all.filter(|(id, _)| !placed.contains(id));
-    let mark = |(id, event): (EventId, &Event)| {
-        let sign = match event.kind {
-            Kind::Started | Kind::Appeared => Sign::Start,
-            Kind::Stopped | Kind::Vanished => Sign::End,
-            _ => Sign::Dot,
-        };
-        RowMark::new(source, &parts, (id, event), sign)
-    };
+    let mark = |of: (EventId, &Event)| RowMark::new(source, &parts, of, Sign::of(of.1.kind));
     others.map(mark).collect()
 }

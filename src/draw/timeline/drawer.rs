@@ -155,16 +155,11 @@ pub(crate) struct Drawer {
 }
 
 impl Timeline {
-    /// The height of band, rows and axis.
+    /// The height of band, rows (at least one) and axis.
     pub(crate) fn height(&self, sizes: Sizes, pitch: f64) -> f64 {
-        let rows = self.rows.len() as f64 * pitch;
-        self.band() + rows + BELOW + sizes.line() + 1.2
-    }
-
-    /// The height of the band with the space below it; 0 without phases.
-    pub(crate) fn band(&self) -> f64 {
         let has_band = !self.phases.is_empty();
-        if has_band { BAND.0 + BAND.1 } else { 0.0 }
+        let band = if has_band { BAND.0 + BAND.1 } else { 0.0 };
+        band + self.rows.len().max(1) as f64 * pitch + BELOW + sizes.line() + 1.2
     }
 }
 
@@ -200,6 +195,8 @@ impl Drawer {
         // The largest width of names, and the widths of rates and of what is beside the rows.
         let (most, rates, mut beside) = match density {
             Density::Frame => (place.w * 0.22, 0.0, 0.0),
+            // Only band and axis, below a map.
+            _ if timeline.rows.is_empty() => (0.0, 0.0, 0.0),
             Density::Page => (place.w.min(WIDE) * 0.36, 12.0, 58.0),
             Density::Paper => (place.w.min(WIDE) * 0.36, 5.1, 68.0),
         };
@@ -212,8 +209,8 @@ impl Drawer {
             canvas.width(&text, of) + indent
         };
         let names = timeline.rows.iter().map(one).fold(0.0, f64::max) + GAP;
-        let unit = canvas.width("min:s", Type::Small) + 1.5;
-        let left = place.x + names.min(most).max(unit);
+        let heads = ["min:s", "phase"].map(|head| canvas.width(head, Type::Small) + 1.0);
+        let left = place.x + names.min(most).max(heads[0]).max(heads[1]);
         let end = place.right() - beside - if beside > 0.0 { 1.8 } else { 0.0 };
         Self {
             density,
@@ -232,13 +229,25 @@ impl Drawer {
     }
 
     /// The y at which the rows begin.
-    pub(crate) fn begin(&self) -> f64 {
-        self.top + self.timeline.band()
+    fn begin(&self) -> f64 {
+        let has_band = !self.timeline.phases.is_empty();
+        self.top
+            + if has_band {
+                BAND.0 + self.gap(BAND.1)
+            } else {
+                0.0
+            }
     }
 
     /// The y at which the rows end, at the axis.
     pub(crate) fn end(&self) -> f64 {
-        self.begin() + self.timeline.rows.len() as f64 * self.pitch + BELOW
+        self.begin() + self.timeline.rows.len() as f64 * self.pitch + self.gap(BELOW)
+    }
+
+    /// A space around rows; without rows the axis is the lower edge of the band.
+    fn gap(&self, space: f64) -> f64 {
+        let has_rows = !self.timeline.rows.is_empty();
+        if has_rows { space } else { 0.0 }
     }
 
     /// The middle of a row.
@@ -302,8 +311,7 @@ impl Drawer {
             // In the row of the first namespace, or above it.
             head = self.top - canvas.sizes.line() / 2.0;
         }
-        let has_rows = !self.timeline.rows.is_empty();
-        if let Some(right) = self.rates.filter(|_| is_paper && has_rows) {
+        if let Some(right) = self.rates.filter(|_| is_paper) {
             canvas.text_end(right, head, small, quiet, "Hz");
         }
         let is_of_nodes = self.timeline.rows.iter().any(|row| !row.nodes.is_empty());

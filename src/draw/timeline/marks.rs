@@ -33,6 +33,17 @@ worded! {
     }
 }
 
+impl Sign {
+    /// The sign of an event of this kind without space for words.
+    pub(super) fn of(kind: Kind) -> Self {
+        match kind {
+            Kind::Started | Kind::Appeared => Self::Start,
+            Kind::Stopped | Kind::Vanished => Self::End,
+            _ => Self::Dot,
+        }
+    }
+}
+
 /// A mark on a row.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RowMark {
@@ -102,19 +113,17 @@ pub(crate) fn marked(source: &FigureSource<'_>, mut rows: Vec<Row>) -> Vec<Row> 
             continue;
         };
         let is_row = places.0.contains_key(&event.what);
-        match event.kind {
-            Kind::Started => rows[row].marks.push(mark(Sign::Start)),
-            Kind::Stopped => rows[row].marks.push(mark(Sign::End)),
-            Kind::Appeared if is_row => rows[row].marks.push(mark(Sign::Start)),
-            Kind::Vanished if is_row => rows[row].marks.push(mark(Sign::End)),
-            Kind::Restarted => {
+        let is_edge = matches!(event.kind, Kind::Appeared | Kind::Vanished) && !is_row;
+        match Sign::of(event.kind) {
+            Sign::Dot if event.kind == Kind::Restarted => {
                 let at = event.until.unwrap_or(event.time);
                 let back = mark(Sign::Start);
-                rows[row].marks.push(mark(Sign::End));
-                rows[row].marks.push(RowMark { at, ..back });
+                let turns = [mark(Sign::End), RowMark { at, ..back }];
+                rows[row].marks.extend(turns);
                 others.push((row, mark(Sign::Letter), event));
             }
-            _ => others.push((row, mark(Sign::Dot), event)),
+            sign if sign == Sign::Dot || is_edge => others.push((row, mark(Sign::Dot), event)),
+            sign => rows[row].marks.push(mark(sign)),
         }
     }
     letter(source, &mut rows, others);
