@@ -85,7 +85,7 @@ impl<'a> TopicTimeline<'a> {
         };
         if !is_sized {
             options.size.w = options.size.w.min(NARROW);
-            if most(&options) < topics {
+            if most(&options) < timeline.rows.len() {
                 options.size = LARGEST;
             }
         }
@@ -125,8 +125,8 @@ impl<'a> TopicTimeline<'a> {
     pub(crate) fn scene(&self, k: usize) -> Scene {
         let many = self.view.frames.len();
         let phase = self.options.phases.get(k).map_or("", String::as_str);
-        let page = self.view.frames.get(k);
-        let page = page.map(|frame| self.page(frame, phase, true));
+        let frame = self.view.frames.get(k);
+        let page = frame.map(|frame| self.page(frame, phase, true));
         Scene {
             title: format!("{}, window {} of {many}", self.options.title(), k + 1),
             ..page.unwrap_or_default()

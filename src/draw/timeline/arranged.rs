@@ -90,19 +90,15 @@ fn folded(rows: Vec<Row>, whole: Span) -> Row {
         None => "node",
     };
     let count = words::count(rows.len(), word);
-    let mut beside: Vec<String> = rows.iter().map(|r| last_part(&r.name).to_owned()).collect();
-    beside.sort();
+    let beside = rows.iter().map(|row| last_part(&row.name).to_owned());
     Row {
         labels: vec![format!("{count} throughout")],
         level: Level::Inside,
         lives: vec![whole],
-        bars: vec![SendingBar {
-            span: whole,
-            share: 1.0,
-        }],
+        bars: vec![SendingBar::new(whole, 1.0)],
         hz: rows.iter().filter_map(|row| row.hz).reduce(|a, b| a + b),
         folded: rows.iter().map(|row| Arc::clone(&row.name)).collect(),
-        beside: [Vec::new(), beside],
+        beside: [Vec::new(), beside.collect()],
         marks: rows.into_iter().flat_map(|row| row.marks).collect(),
         ..Row::default()
     }
@@ -160,11 +156,8 @@ pub(crate) fn together(
     }
     for row in &mut rows {
         row.lives = Span::joined(std::mem::take(&mut row.lives), 0);
-        let bar = |life: &Span| SendingBar {
-            span: *life,
-            share: JOINED,
-        };
-        row.bars = row.lives.iter().map(bar).collect();
+        let bars = row.lives.iter().map(|life| SendingBar::new(*life, JOINED));
+        row.bars = bars.collect();
     }
     rows.sort_by(|a, b| (a.start(), &a.labels).cmp(&(b.start(), &b.labels)));
     let mut others = unplaced(source, &rows);

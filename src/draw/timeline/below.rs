@@ -139,10 +139,8 @@ fn messages(view: &View, width: f64) -> Row {
     let busiest = view.frames.chunks(per_bar).map(rate).fold(0.0, f64::max);
     let bars = view.frames.chunks(per_bar).filter_map(|frames| {
         let (first, last) = (frames.first()?, frames.last()?);
-        (busiest > 0.0).then(|| SendingBar {
-            span: Span::new(first.span.start, last.span.end),
-            share: rate(frames) / busiest,
-        })
+        let span = Span::new(first.span.start, last.span.end);
+        (busiest > 0.0).then(|| SendingBar::new(span, rate(frames) / busiest))
     });
     Row {
         labels: vec!["messages/s".to_owned()],

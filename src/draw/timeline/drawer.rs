@@ -58,10 +58,10 @@ impl Axis {
         self.left + part * (self.right - self.left)
     }
 
-    /// The rectangle of a time, from `y` on.
+    /// The rectangle of a time, from `y` on, wide enough to be seen.
     fn rect(&self, time: Span, y: f64, height: f64) -> Rect {
         let left = self.x(time.start);
-        Rect::new(left, y, self.x(time.end) - left, height)
+        Rect::new(left, y, (self.x(time.end) - left).max(0.25), height)
     }
 
     /// Draws the axis at `y` with round times below, and its end; returns the y at which it ends below. `unit` is
@@ -73,8 +73,8 @@ impl Axis {
         let (of, color) = (Type::Small, ink::QUIET);
         let total = self.span.nanos();
         if unit {
-            let hours = total >= 3_600_000_000_000;
-            let unit = if hours { "h:min:s" } else { "min:s" };
+            let is_long = total >= 3_600_000_000_000;
+            let unit = if is_long { "h:min:s" } else { "min:s" };
             canvas.text_end(self.left - 0.9, middle, of, color, unit);
         }
         let last = words::moment_rounded(total);
@@ -258,11 +258,7 @@ impl Drawer {
     /// The frame around a window.
     pub(crate) fn window(&self, time: Span) -> Rect {
         let top = self.begin() - 0.4;
-        let place = self.axis.rect(time, top, self.end() - top);
-        Rect {
-            w: place.w.max(0.3),
-            ..place
-        }
+        self.axis.rect(time, top, self.end() - top)
     }
 
     /// Draws what is the same in every window: band, bars and axis; returns the y at which the axis ends below.
@@ -314,7 +310,11 @@ impl Drawer {
         if let Some(right) = self.rates.filter(|_| is_paper) {
             canvas.text_end(right, head, small, quiet, "Hz");
         }
-        let is_of_nodes = self.timeline.rows.iter().any(|row| !row.nodes.is_empty());
+        let is_of_nodes = self
+            .timeline
+            .rows
+            .iter()
+            .any(|row| !row.beside[0].is_empty());
         if let Some((x, _)) = self.beside.filter(|_| is_of_nodes) {
             let text = "→ publishes  ← subscribes, as far as known";
             canvas.text(x, head, small, quiet, text);
@@ -376,9 +376,7 @@ impl Drawer {
 
     fn bar(&self, canvas: &mut PaperCanvas<'_>, y: f64, bar: &SendingBar, color: Color) {
         let high = (BAR.0 + (BAR.1 - BAR.0) * bar.share) * self.pitch;
-        let place = self.axis.rect(bar.span, y - high / 2.0, high);
-        let w = place.w.max(0.25);
-        canvas.fill(Rect { w, ..place }, color);
+        canvas.fill(self.axis.rect(bar.span, y - high / 2.0, high), color);
     }
 
     /// Draws what a window adds to the ground: dark bars, the current phase, and the names, those for which `is_now`
@@ -552,8 +550,7 @@ pub(crate) fn put(canvas: &mut PaperCanvas<'_>, sign: Sign, at: Point, size: f64
 
 /// The letter of an event: a, b, c, …
 pub(crate) fn letter(k: usize) -> String {
-    let letter = ('a'..='z').nth(k);
-    letter.map_or_else(String::new, String::from)
+    ('a'..='z').nth(k).into_iter().collect()
 }
 
 /// A rate without its unit: two digits from 1 Hz on, one below; more are neither known nor needed. Four digits are wider
@@ -568,15 +565,12 @@ fn number(hz: f64) -> String {
 /// Draws as many of the names beside a row as fit, first the dark ones.
 fn beside(canvas: &mut PaperCanvas<'_>, row: &Row, mut at: Point, mut room: f64) {
     let [dark, quiet] = &row.beside;
-    let one = |names: &[String]| canvas.width(&fitting(names, 1, |_| true), Type::Small);
-    let least = if quiet.is_empty() {
-        0.0
-    } else {
-        one(quiet) + 1.4
-    };
-    for (names, color, least) in [(dark, ink::TEXT, least), (quiet, ink::QUIET, 0.0)] {
-        let fits = |text: &str| canvas.width(text, Type::Small) <= room - least;
-        let text = canvas.cut(&fitting(names, MOST_NAMES.1, fits), Type::Small, room);
+    // Something quiet gets a third at least.
+    let most = if quiet.is_empty() { room } else { room * 0.66 };
+    for (names, color, most) in [(dark, ink::TEXT, most), (quiet, ink::QUIET, room)] {
+        let most = most.min(room);
+        let fits = |text: &str| canvas.width(text, Type::Small) <= most;
+        let text = canvas.cut(&fitting(names, MOST_NAMES.1, fits), Type::Small, most);
         canvas.text(at.x, at.y, Type::Small, color, &text);
         let wide = canvas.width(&text, Type::Small) + if text.is_empty() { 0.0 } else { 1.4 };
         (at.x, room) = (at.x + wide, (room - wide).max(0.0));
