@@ -34,7 +34,7 @@ worded! {
     pub enum RowKind {
         /// Nodes, by role.
         Nodes = "nodes",
-        /// Nodes of one namespace that exist in the same phases.
+        /// Nodes that start and stop together; in maps and steps, of one namespace and in the same phases.
         Groups = "groups",
         /// Topics.
         Topics = "topics",

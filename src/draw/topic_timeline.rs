@@ -75,17 +75,17 @@ impl<'a> TopicTimeline<'a> {
         is_sized: bool,
     ) -> Self {
         let rows: Vec<Row> = of_topics(source).into_iter().map(Row::plain).collect();
-        let (topics, pitch) = (rows.len(), sizes().pitch());
+        let (topics, pitch) = (rows.len(), Sizes::SCREEN.pitch());
         let each = |is_folded| by_namespace(rows.clone(), source.span(), is_folded);
         let mut timeline = Timeline::named(source, each(false));
-        let others = timeline.height(sizes(), 0.0) + BELOW;
+        let others = timeline.height(Sizes::SCREEN, 0.0) + BELOW;
         let most = |options: &PageOptions| {
             let free = room(style, options).h / SCALE.0 - others;
             cast::to_usize((free / pitch).max(1.0))
         };
         if !is_sized {
             options.size.w = options.size.w.min(NARROW);
-            if most(&options) < topics {
+            if most(&options) < timeline.rows.len() {
                 options.size = LARGEST;
             }
         }
@@ -103,10 +103,10 @@ impl<'a> TopicTimeline<'a> {
         let page = PageFrame::new(style, &options, 0, Strip::Timeline);
         if !is_sized {
             // A short timeline has no empty space below; encoders of video need an even number of rows.
-            let end = libm::ceil((room.y + high * scale) / 2.0) * 2.0;
+            let end = libm::ceil(f64::midpoint(room.y, high * scale)) * 2.0;
             options.size.h = end.min(options.size.h);
         }
-        let canvas = PaperCanvas::new(fonts, sizes(), scale);
+        let canvas = PaperCanvas::new(fonts, Sizes::SCREEN, scale);
         let drawer = Drawer::new(timeline, Density::Page, &canvas, room.scaled(1.0 / scale));
         Self {
             title: Title::new(style, fonts, &page, view, &options),
@@ -125,11 +125,11 @@ impl<'a> TopicTimeline<'a> {
     pub(crate) fn scene(&self, k: usize) -> Scene {
         let many = self.view.frames.len();
         let phase = self.options.phases.get(k).map_or("", String::as_str);
-        let empty = Frame::empty(0, self.source.span());
         let frame = self.view.frames.get(k);
+        let page = frame.map(|frame| self.page(frame, phase, true));
         Scene {
             title: format!("{}, window {} of {many}", self.options.title(), k + 1),
-            ..self.page(frame.unwrap_or(&empty), phase, true)
+            ..page.unwrap_or_default()
         }
     }
 
@@ -163,7 +163,7 @@ impl<'a> TopicTimeline<'a> {
             let state = graph.as_ref()?.get(Element::Topic(row.topic?));
             state.map(ElementState::messages).filter(|count| *count > 0)
         };
-        let mut canvas = PaperCanvas::new(self.fonts, sizes(), self.scale);
+        let mut canvas = PaperCanvas::new(self.fonts, Sizes::SCREEN, self.scale);
         let end = self.drawer.ground(&mut canvas);
         let is_now = |row: &Row| match row.topic {
             Some(_) => !is_window || count(row).is_some(),
@@ -194,7 +194,7 @@ impl<'a> TopicTimeline<'a> {
         canvas.begin("why");
         let wide = self.options.size.w / self.scale - 2.0 * self.drawer.left;
         let why = canvas.cut(&self.why(), Type::Small, wide);
-        let y = end + LABEL + 1.6 + sizes().line() / 2.0;
+        let y = end + LABEL + 1.6 + Sizes::SCREEN.line() / 2.0;
         canvas.text(self.drawer.left, y, Type::Small, ink::QUIET, &why);
         let mut groups = Vec::new();
         if !self.options.bare {
@@ -236,7 +236,7 @@ impl<'a> TopicTimeline<'a> {
         };
         let roles = self.source.roles.iter();
         let all: Vec<_> = roles.filter(|(_, n)| n.iter().any(is_known)).collect();
-        let y = self.drawer.end() + sizes().line() + 2.0 + LABEL / 2.0;
+        let y = self.drawer.end() + Sizes::SCREEN.line() + 2.0 + LABEL / 2.0;
         if !all.is_empty() {
             let left = self.drawer.left;
             canvas.text(left, y, Type::Small, ink::QUIET, "nodes known");
@@ -263,10 +263,6 @@ impl<'a> TopicTimeline<'a> {
             x += wide + 1.4;
         }
     }
-}
-
-fn sizes() -> Sizes {
-    Sizes::of_names(7.0)
 }
 
 /// The part of the page for the timeline.

@@ -177,7 +177,7 @@ impl HtmlPage<'_> {
         };
         let change = self.sequence.unfolded.map_or(0.25, |u| u.rate_change);
         let lives = self.sequence.unfolded.and_then(|u| u.lives);
-        signs::legend(&views, change) + &signs::timeline(lives)
+        signs::legend(&views, change) + &lives.map(signs::timeline).unwrap_or_default()
     }
 
     /// The notices about hidden elements and problems, one per line.

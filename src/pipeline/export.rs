@@ -16,7 +16,7 @@ use crate::draw::picture::{Measured, Picture};
 use crate::draw::strip::{Strip, StripSource, StripWidth, strip};
 use crate::draw::timeline::Timeline;
 use crate::draw::timeline::arranged::{by_namespace, together};
-use crate::draw::timeline::rows::{known, of_topics};
+use crate::draw::timeline::rows;
 use crate::draw::timeline::source::FigureSource;
 use crate::draw::topic_timeline::TopicTimeline;
 use crate::export::options::{self, Choice, FigureOptions};
@@ -211,11 +211,11 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
         &drawing.view.topic_filter,
         job.reading.phases.is_named(),
     );
-    let known = (is_drawn && !is_timeline).then(|| known(&source));
+    let known = (is_drawn && !is_timeline).then(|| rows::of(&source, !source.knows_publishers()));
     if let Some(known) = &known {
-        let most = rows(drawing.page.size.h);
-        let rows = together(&source, known.clone(), most, false);
-        drawing.page.timeline = Timeline::named(&source, rows);
+        let most = most_rows(drawing.page.size.h);
+        let known = together(&source, known.clone(), most, false);
+        drawing.page.timeline = Timeline::named(&source, known);
     }
     let Composed {
         view,
@@ -375,7 +375,7 @@ fn long_job(job: &Render, sequence: &Sequence<'_>) -> Option<String> {
 const ROWS: (f64, f64) = (8.0, 78.0);
 
 /// The number of rows below a frame of this height.
-fn rows(height: f64) -> usize {
+fn most_rows(height: f64) -> usize {
     cast::to_usize((height / ROWS.1).clamp(1.0, ROWS.0))
 }
 
@@ -409,7 +409,7 @@ fn show_timeline(
     let data = chosen(job, &mission, &mut all);
     let lives = Timeline::new(
         &source,
-        by_namespace(of_topics(&source), mission.span, false),
+        by_namespace(rows::of(&source, true), mission.span, false),
     );
     // Each topic has its own row.
     let mut each = drawing.clone();

@@ -1,5 +1,7 @@
 //! A page with one figure: with nodes, else with groups, else refused; and the notes below the drawing.
 
+use std::collections::BTreeMap;
+
 use super::{FigureOptions, MOST_HEIGHT, RowKind};
 use crate::base::cast;
 use crate::base::error::{Error, Result};
@@ -12,7 +14,7 @@ use crate::draw::timeline::canvas::{PX_PER_MM, PaperCanvas, Sizes};
 use crate::draw::timeline::drawer::{Density, Drawer};
 use crate::draw::timeline::notes::flow;
 use crate::draw::timeline::phases::names;
-use crate::draw::timeline::rows::{Row, of_nodes, of_topics};
+use crate::draw::timeline::rows::{self, Row};
 use crate::draw::timeline::source::FigureSource;
 use crate::draw::timeline::{Timeline, legend};
 
@@ -65,41 +67,31 @@ impl<'a> FigureSheet<'a> {
             Some(kind) => kind == RowKind::Topics,
             None => !source.knows_publishers(),
         };
-        let rows = if by_topics {
-            of_topics(source)
-        } else {
-            of_nodes(source)
-        };
+        let rows = rows::of(source, by_topics);
         if rows.is_empty() {
             return Err(nothing(source));
         }
-        let page = |rows| {
-            self.lives_page(&Timeline::new(source, rows), by_topics)
-                .filter(fits)
-        };
+        let page = |rows| self.lives_page(&Timeline::new(source, rows)).filter(fits);
         let each = by_namespace(rows.clone(), source.span(), true);
-        let scene = || page(each.clone()).filter(|_| kind != Some(RowKind::Groups));
-        if let Some(scene) = scene() {
+        if kind != Some(RowKind::Groups)
+            && let Some(scene) = page(each.clone())
+        {
             return Ok((scene, Vec::new()));
         }
-        let grouped = || page(together(source, rows.clone(), self.most_rows(), true));
-        match grouped().filter(|_| kind.is_none_or(|kind| kind == RowKind::Groups)) {
-            Some(scene) if kind.is_some() => Ok((scene, Vec::new())),
-            Some(scene) => {
-                let many = words::count(rows.len(), if by_topics { "topic" } else { "node" });
-                let remark = format!(
-                    "{many} do not fit on a page; those that start and stop together are one row"
-                );
-                Ok((scene, vec![remark]))
-            }
-            None => Err(self.too_high(&Timeline::new(source, each), &rows, by_topics)),
+        if matches!(kind, None | Some(RowKind::Groups))
+            && let Some(scene) = page(together(source, rows.clone(), self.most_rows(), true))
+        {
+            let remark =
+                "not all rows fit on a page; elements that start and stop together are one row";
+            let remarks = kind.is_none().then(|| remark.to_owned());
+            return Ok((scene, remarks.into_iter().collect()));
         }
+        Err(self.too_high(&Timeline::new(source, each), &rows, by_topics))
     }
 
     /// The page of some rows, of any height; `None` if it is too narrow.
-    fn lives_page(&self, timeline: &Timeline, by_topics: bool) -> Option<Scene> {
-        let width = self.options.width_mm;
-        let mut canvas = self.canvas();
+    fn lives_page(&self, timeline: &Timeline) -> Option<Scene> {
+        let (mut canvas, width) = (self.canvas(), self.options.width_mm);
         let drawer = lives_drawer(timeline, &canvas, width)?;
         let mut y = drawer.ground(&mut canvas);
         drawer.marks(&mut canvas);
@@ -113,12 +105,7 @@ impl<'a> FigureSheet<'a> {
             y = flow(&mut canvas, width, y, &notes);
             y = flow(&mut canvas, width, y + 0.15, &legend::signs(timeline));
         }
-        let what = if by_topics {
-            "Lifelines of topics"
-        } else {
-            "Lifelines"
-        };
-        Some(canvas.into_scene(Size::new(width, y + 0.3), self.title(what)))
+        Some(canvas.into_scene(Size::new(width, y + 0.3), self.title("Lifelines")))
     }
 
     /// The number of rows that fit on a page with their notes.
@@ -128,12 +115,11 @@ impl<'a> FigureSheet<'a> {
 
     /// The error for a figure that does not fit, with a namespace that would fit.
     fn too_high(&self, timeline: &Timeline, rows: &[Row], by_topics: bool) -> Error {
-        let canvas = self.canvas();
-        let width = self.options.width_mm;
+        let (canvas, width) = (self.canvas(), self.options.width_mm);
         if lives_drawer(timeline, &canvas, width).is_none() {
-            let wider = (0..100).map(|mm| libm::ceil(width) + f64::from(mm));
-            let enough = wider.filter(|w| lives_drawer(timeline, &canvas, *w).is_some());
-            let enough = enough.take(1).next().unwrap_or(88.0);
+            let mut wider = (0..100).map(|mm| libm::ceil(width) + f64::from(mm));
+            let enough = wider.find(|w| lives_drawer(timeline, &canvas, *w).is_some());
+            let enough = enough.unwrap_or(88.0);
             return Error::usage(
                 format!("{width} mm leave no space for the time axis beside the names"),
                 format!("use `--width {enough}mm`"),
@@ -156,15 +142,12 @@ impl<'a> FigureSheet<'a> {
 
 /// The filter that leaves as many tracks as fit: the largest namespace that is not too large.
 pub(crate) fn filter_that_fits(tracks: &[Row], most: usize, flag: &str, word: &str) -> String {
-    let mut spaces: Vec<(&str, usize)> = Vec::new();
+    let mut spaces: BTreeMap<&str, usize> = BTreeMap::new();
     for top in tracks.iter().filter_map(|t| top_space(&t.name)) {
-        match spaces.iter_mut().find(|(name, _)| *name == top) {
-            Some((_, many)) => *many += 1,
-            None => spaces.push((top, 1)),
-        }
+        *spaces.entry(top).or_default() += 1;
     }
-    let fitting = spaces.iter().filter(|(_, many)| *many <= most);
-    let best = fitting.max_by_key(|(name, many)| (*many, std::cmp::Reverse(*name)));
+    let fitting = spaces.iter().filter(|(_, many)| **many <= most);
+    let best = fitting.max_by_key(|(name, many)| (**many, std::cmp::Reverse(**name)));
     let most = words::count(most, word);
     match best {
         None => format!("at most {most} fit; select some with `{flag}`"),

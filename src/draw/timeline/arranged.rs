@@ -11,7 +11,7 @@ use crate::base::time::Span;
 use crate::base::words;
 use crate::graph::NodeId;
 use crate::mission::EventId;
-use crate::mission::event_log::{Event, Kind};
+use crate::mission::event_log::Event;
 
 /// The part of the mission, one in this many, up to which starts count as one burst of the staircase.
 const BURST: i64 = 66;
@@ -34,8 +34,8 @@ pub(crate) fn by_namespace(rows: Vec<Row>, whole: Span, is_folded: bool) -> Vec<
     let givers: BTreeSet<NodeId> = givers.filter_map(|mark| mark.from).collect();
     let is_fixed = |row: &Row| {
         let is_marked = row.marks.iter().any(|mark| mark.sign != Sign::Start);
-        let gives = row.nodes.iter().any(|id| givers.contains(id));
-        !is_marked && !gives && is_throughout(row, whole)
+        let is_giver = row.nodes.iter().any(|id| givers.contains(id));
+        !is_marked && !is_giver && is_throughout(row, whole)
     };
     let many = rows.len();
     let mut spaces: BTreeMap<String, Vec<Row>> = BTreeMap::new();
@@ -90,19 +90,15 @@ fn folded(rows: Vec<Row>, whole: Span) -> Row {
         None => "node",
     };
     let count = words::count(rows.len(), word);
-    let mut beside: Vec<String> = rows.iter().map(|r| last_part(&r.name).to_owned()).collect();
-    beside.sort();
+    let beside = rows.iter().map(|row| last_part(&row.name).to_owned());
     Row {
         labels: vec![format!("{count} throughout")],
         level: Level::Inside,
         lives: vec![whole],
-        bars: vec![SendingBar {
-            span: whole,
-            share: 1.0,
-        }],
+        bars: vec![SendingBar::new(whole, 1.0)],
         hz: rows.iter().filter_map(|row| row.hz).reduce(|a, b| a + b),
         folded: rows.iter().map(|row| Arc::clone(&row.name)).collect(),
-        beside: [Vec::new(), beside],
+        beside: [Vec::new(), beside.collect()],
         marks: rows.into_iter().flat_map(|row| row.marks).collect(),
         ..Row::default()
     }
@@ -113,9 +109,9 @@ fn staircase(mut rows: Vec<Row>, whole: Span) -> Vec<Row> {
     rows.sort_by_key(Row::start);
     let (near, grid) = (whole.nanos() / BURST, (whole.nanos() / NEAR).max(1));
     // Elements that never end come first.
-    let end = |row: &Row| match row.is_ending() {
-        true => row.end().since(whole.start) / grid,
-        false => i64::MAX,
+    let end = |row: &Row| {
+        let at = row.end().since(whole.start) / grid;
+        if row.is_ending() { at } else { i64::MAX }
     };
     let close = |a: &Row, b: &Row| b.start().since(a.start()) <= near;
     for burst in rows.chunk_by_mut(close) {
@@ -160,11 +156,8 @@ pub(crate) fn together(
     }
     for row in &mut rows {
         row.lives = Span::joined(std::mem::take(&mut row.lives), 0);
-        let bar = |life: &Span| SendingBar {
-            span: *life,
-            share: JOINED,
-        };
-        row.bars = row.lives.iter().map(bar).collect();
+        let bars = row.lives.iter().map(|life| SendingBar::new(*life, JOINED));
+        row.bars = bars.collect();
     }
     rows.sort_by(|a, b| (a.start(), &a.labels).cmp(&(b.start(), &b.labels)));
     let mut others = unplaced(source, &rows);
@@ -230,13 +223,6 @@ fn unplaced(source: &FigureSource<'_>, rows: &[Row]) -> Vec<RowMark> {
     let parts = source.mission.log.all_parts();
     let all = source.mission.log.headlines(source.span());
     let others = all.filter(|(id, _)| !placed.contains(id));
-    let mark = |(id, event): (EventId, &Event)| {
-        let sign = match event.kind {
-            Kind::Started | Kind::Appeared => Sign::Start,
-            Kind::Stopped | Kind::Vanished => Sign::End,
-            _ => Sign::Dot,
-        };
-        RowMark::new(source, &parts, (id, event), sign)
-    };
+    let mark = |of: (EventId, &Event)| RowMark::new(source, &parts, of, Sign::of(of.1.kind));
     others.map(mark).collect()
 }

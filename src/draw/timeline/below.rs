@@ -33,15 +33,11 @@ pub(crate) struct BelowSizes<'a> {
 }
 
 impl BelowSizes<'_> {
-    fn sizes() -> Sizes {
-        Sizes::of_names(7.0)
-    }
-
     /// Pixels per millimetre: all text is small.
     fn scale(&self) -> f64 {
         let least = if self.is_paper { 0.0 } else { SMALLEST_TEXT };
         let text = (self.style.timeline.size * self.unit).max(least);
-        text / (Self::sizes().small * MM_PER_PT)
+        text / (Sizes::SCREEN.small * MM_PER_PT)
     }
 
     /// The distance from row to row in millimetres; messages have one high row.
@@ -51,15 +47,13 @@ impl BelowSizes<'_> {
         } else if timeline.rows.is_empty() {
             self.style.timeline.height * self.unit / self.scale()
         } else {
-            Self::sizes().pitch()
+            Sizes::SCREEN.pitch()
         }
     }
 
     /// The height of the strip in pixels.
     pub(crate) fn height(&self, timeline: &Timeline) -> f64 {
-        let pitch = self.pitch(timeline);
-        let messages = if timeline.rows.is_empty() { pitch } else { 0.0 };
-        let height = timeline.height(Self::sizes(), pitch) + messages;
+        let height = timeline.height(Sizes::SCREEN, self.pitch(timeline));
         height * self.scale() + 2.0 * AROUND * self.unit
     }
 }
@@ -96,7 +90,7 @@ impl<'a> Below<'a> {
             timeline.rows = vec![messages(view, wide * scale)];
         }
         timeline.span = span;
-        let canvas = PaperCanvas::new(fonts, BelowSizes::sizes(), scale);
+        let canvas = PaperCanvas::new(fonts, Sizes::SCREEN, scale);
         let place = Rect::new(margin, (strip.y + AROUND * sizes.unit) / scale, wide, 0.0);
         let mut drawer = Drawer::new(timeline, Density::Frame, &canvas, place);
         drawer.pitch = pitch;
@@ -110,7 +104,7 @@ impl<'a> Below<'a> {
     }
 
     fn canvas(&self) -> PaperCanvas<'a> {
-        PaperCanvas::new(self.fonts, BelowSizes::sizes(), self.scale)
+        PaperCanvas::new(self.fonts, Sizes::SCREEN, self.scale)
     }
 
     /// The groups that are equal in every frame.
@@ -151,10 +145,8 @@ fn messages(view: &View, width: f64) -> Row {
     let busiest = view.frames.chunks(per_bar).map(rate).fold(0.0, f64::max);
     let bars = view.frames.chunks(per_bar).filter_map(|frames| {
         let (first, last) = (frames.first()?, frames.last()?);
-        (busiest > 0.0).then(|| SendingBar {
-            span: Span::new(first.span.start, last.span.end),
-            share: rate(frames) / busiest,
-        })
+        let span = Span::new(first.span.start, last.span.end);
+        (busiest > 0.0).then(|| SendingBar::new(span, rate(frames) / busiest))
     });
     Row {
         labels: vec!["messages/s".to_owned()],

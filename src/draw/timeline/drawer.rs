@@ -58,10 +58,10 @@ impl Axis {
         self.left + part * (self.right - self.left)
     }
 
-    /// The rectangle of a time, from `y` on.
+    /// The rectangle of a time, from `y` on, wide enough to be seen.
     fn rect(&self, time: Span, y: f64, height: f64) -> Rect {
         let left = self.x(time.start);
-        Rect::new(left, y, self.x(time.end) - left, height)
+        Rect::new(left, y, (self.x(time.end) - left).max(0.25), height)
     }
 
     /// Draws the axis at `y` with round times below, and its end; returns the y at which it ends below. `unit` is
@@ -73,8 +73,8 @@ impl Axis {
         let (of, color) = (Type::Small, ink::QUIET);
         let total = self.span.nanos();
         if unit {
-            let hours = total >= 3_600_000_000_000;
-            let unit = if hours { "h:min:s" } else { "min:s" };
+            let is_long = total >= 3_600_000_000_000;
+            let unit = if is_long { "h:min:s" } else { "min:s" };
             canvas.text_end(self.left - 0.9, middle, of, color, unit);
         }
         let last = words::moment_rounded(total);
@@ -155,16 +155,11 @@ pub(crate) struct Drawer {
 }
 
 impl Timeline {
-    /// The height of band, rows and axis.
+    /// The height of band, rows (at least one) and axis.
     pub(crate) fn height(&self, sizes: Sizes, pitch: f64) -> f64 {
-        let rows = self.rows.len() as f64 * pitch;
-        self.band() + rows + BELOW + sizes.line() + 1.2
-    }
-
-    /// The height of the band with the space below it; 0 without phases.
-    pub(crate) fn band(&self) -> f64 {
         let has_band = !self.phases.is_empty();
-        if has_band { BAND.0 + BAND.1 } else { 0.0 }
+        let band = if has_band { BAND.0 + BAND.1 } else { 0.0 };
+        band + self.rows.len().max(1) as f64 * pitch + BELOW + sizes.line() + 1.2
     }
 }
 
@@ -200,6 +195,8 @@ impl Drawer {
         // The largest width of names, and the widths of rates and of what is beside the rows.
         let (most, rates, mut beside) = match density {
             Density::Frame => (place.w * 0.22, 0.0, 0.0),
+            // Only band and axis, below a map.
+            _ if timeline.rows.is_empty() => (0.0, 0.0, 0.0),
             Density::Page => (place.w.min(WIDE) * 0.36, 12.0, 58.0),
             Density::Paper => (place.w.min(WIDE) * 0.36, 5.1, 68.0),
         };
@@ -212,8 +209,8 @@ impl Drawer {
             canvas.width(&text, of) + indent
         };
         let names = timeline.rows.iter().map(one).fold(0.0, f64::max) + GAP;
-        let unit = canvas.width("min:s", Type::Small) + 1.5;
-        let left = place.x + names.min(most).max(unit);
+        let heads = ["min:s", "phase"].map(|head| canvas.width(head, Type::Small) + 1.0);
+        let left = place.x + names.min(most).max(heads[0]).max(heads[1]);
         let end = place.right() - beside - if beside > 0.0 { 1.8 } else { 0.0 };
         Self {
             density,
@@ -232,13 +229,25 @@ impl Drawer {
     }
 
     /// The y at which the rows begin.
-    pub(crate) fn begin(&self) -> f64 {
-        self.top + self.timeline.band()
+    fn begin(&self) -> f64 {
+        let has_band = !self.timeline.phases.is_empty();
+        self.top
+            + if has_band {
+                BAND.0 + self.gap(BAND.1)
+            } else {
+                0.0
+            }
     }
 
     /// The y at which the rows end, at the axis.
     pub(crate) fn end(&self) -> f64 {
-        self.begin() + self.timeline.rows.len() as f64 * self.pitch + BELOW
+        self.begin() + self.timeline.rows.len() as f64 * self.pitch + self.gap(BELOW)
+    }
+
+    /// A space around rows; without rows the axis is the lower edge of the band.
+    fn gap(&self, space: f64) -> f64 {
+        let has_rows = !self.timeline.rows.is_empty();
+        if has_rows { space } else { 0.0 }
     }
 
     /// The middle of a row.
@@ -249,11 +258,7 @@ impl Drawer {
     /// The frame around a window.
     pub(crate) fn window(&self, time: Span) -> Rect {
         let top = self.begin() - 0.4;
-        let place = self.axis.rect(time, top, self.end() - top);
-        Rect {
-            w: place.w.max(0.3),
-            ..place
-        }
+        self.axis.rect(time, top, self.end() - top)
     }
 
     /// Draws what is the same in every window: band, bars and axis; returns the y at which the axis ends below.
@@ -302,11 +307,14 @@ impl Drawer {
             // In the row of the first namespace, or above it.
             head = self.top - canvas.sizes.line() / 2.0;
         }
-        let has_rows = !self.timeline.rows.is_empty();
-        if let Some(right) = self.rates.filter(|_| is_paper && has_rows) {
+        if let Some(right) = self.rates.filter(|_| is_paper) {
             canvas.text_end(right, head, small, quiet, "Hz");
         }
-        let is_of_nodes = self.timeline.rows.iter().any(|row| !row.nodes.is_empty());
+        let is_of_nodes = self
+            .timeline
+            .rows
+            .iter()
+            .any(|row| !row.beside[0].is_empty());
         if let Some((x, _)) = self.beside.filter(|_| is_of_nodes) {
             let text = "→ publishes  ← subscribes, as far as known";
             canvas.text(x, head, small, quiet, text);
@@ -368,9 +376,7 @@ impl Drawer {
 
     fn bar(&self, canvas: &mut PaperCanvas<'_>, y: f64, bar: &SendingBar, color: Color) {
         let high = (BAR.0 + (BAR.1 - BAR.0) * bar.share) * self.pitch;
-        let place = self.axis.rect(bar.span, y - high / 2.0, high);
-        let w = place.w.max(0.25);
-        canvas.fill(Rect { w, ..place }, color);
+        canvas.fill(self.axis.rect(bar.span, y - high / 2.0, high), color);
     }
 
     /// Draws what a window adds to the ground: dark bars, the current phase, and the names, those for which `is_now`
@@ -544,8 +550,7 @@ pub(crate) fn put(canvas: &mut PaperCanvas<'_>, sign: Sign, at: Point, size: f64
 
 /// The letter of an event: a, b, c, …
 pub(crate) fn letter(k: usize) -> String {
-    let letter = ('a'..='z').nth(k);
-    letter.map_or_else(String::new, String::from)
+    ('a'..='z').nth(k).into_iter().collect()
 }
 
 /// A rate without its unit: two digits from 1 Hz on, one below; more are neither known nor needed. Four digits are wider
@@ -560,15 +565,12 @@ fn number(hz: f64) -> String {
 /// Draws as many of the names beside a row as fit, first the dark ones.
 fn beside(canvas: &mut PaperCanvas<'_>, row: &Row, mut at: Point, mut room: f64) {
     let [dark, quiet] = &row.beside;
-    let one = |names: &[String]| canvas.width(&fitting(names, 1, |_| true), Type::Small);
-    let least = if quiet.is_empty() {
-        0.0
-    } else {
-        one(quiet) + 1.4
-    };
-    for (names, color, least) in [(dark, ink::TEXT, least), (quiet, ink::QUIET, 0.0)] {
-        let fits = |text: &str| canvas.width(text, Type::Small) <= room - least;
-        let text = canvas.cut(&fitting(names, MOST_NAMES.1, fits), Type::Small, room);
+    // Something quiet gets a third at least.
+    let most = if quiet.is_empty() { room } else { room * 0.66 };
+    for (names, color, most) in [(dark, ink::TEXT, most), (quiet, ink::QUIET, room)] {
+        let most = most.min(room);
+        let fits = |text: &str| canvas.width(text, Type::Small) <= most;
+        let text = canvas.cut(&fitting(names, MOST_NAMES.1, fits), Type::Small, most);
         canvas.text(at.x, at.y, Type::Small, color, &text);
         let wide = canvas.width(&text, Type::Small) + if text.is_empty() { 0.0 } else { 1.4 };
         (at.x, room) = (at.x + wide, (room - wide).max(0.0));

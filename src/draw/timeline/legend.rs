@@ -8,6 +8,7 @@ use super::notes::{InlineSign, TextRun, Unbroken, sentence};
 use super::rows::{Level, Row};
 use crate::base::geometry::{Point, Rect};
 use crate::base::name::last_part;
+use crate::base::time::Span;
 use crate::base::words;
 use crate::draw::scene::Stroke;
 
@@ -61,7 +62,7 @@ pub(crate) fn signs(timeline: &Timeline) -> Vec<Unbroken> {
         .collect();
     let is_silent = |row: &&Row| {
         let busy: i64 = row.bars.iter().map(|b| b.span.nanos()).sum();
-        let alive: i64 = row.lives.iter().map(|life| life.nanos()).sum();
+        let alive: i64 = row.lives.iter().map(Span::nanos).sum();
         alive - busy > alive / 50
     };
     let marks = || timeline.rows.iter().flat_map(|row| &row.marks);

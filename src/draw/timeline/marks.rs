@@ -33,6 +33,17 @@ worded! {
     }
 }
 
+impl Sign {
+    /// The sign of an event of this kind without space for words.
+    pub(super) fn of(kind: Kind) -> Self {
+        match kind {
+            Kind::Started | Kind::Appeared => Self::Start,
+            Kind::Stopped | Kind::Vanished => Self::End,
+            _ => Self::Dot,
+        }
+    }
+}
+
 /// A mark on a row.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RowMark {
@@ -89,10 +100,9 @@ pub(crate) fn marked(source: &FigureSource<'_>, mut rows: Vec<Row>) -> Vec<Row> 
         {
             arrows += 1;
             let topic = source.mission.elements.ends(event.what).1;
+            let text = topic.map_or("", |id| last_part(source.topic(id)));
             rows[to].marks.push(RowMark {
-                text: topic
-                    .map_or("", |id| last_part(source.topic(id)))
-                    .to_owned(),
+                text: text.to_owned(),
                 from: Some(from),
                 ..mark(Sign::Handover)
             });
@@ -102,19 +112,17 @@ pub(crate) fn marked(source: &FigureSource<'_>, mut rows: Vec<Row>) -> Vec<Row> 
             continue;
         };
         let is_row = places.0.contains_key(&event.what);
-        match event.kind {
-            Kind::Started => rows[row].marks.push(mark(Sign::Start)),
-            Kind::Stopped => rows[row].marks.push(mark(Sign::End)),
-            Kind::Appeared if is_row => rows[row].marks.push(mark(Sign::Start)),
-            Kind::Vanished if is_row => rows[row].marks.push(mark(Sign::End)),
-            Kind::Restarted => {
+        let is_edge = matches!(event.kind, Kind::Appeared | Kind::Vanished) && !is_row;
+        match Sign::of(event.kind) {
+            Sign::Dot if event.kind == Kind::Restarted => {
                 let at = event.until.unwrap_or(event.time);
                 let back = mark(Sign::Start);
-                rows[row].marks.push(mark(Sign::End));
-                rows[row].marks.push(RowMark { at, ..back });
+                let turns = [mark(Sign::End), RowMark { at, ..back }];
+                rows[row].marks.extend(turns);
                 others.push((row, mark(Sign::Letter), event));
             }
-            _ => others.push((row, mark(Sign::Dot), event)),
+            sign if sign == Sign::Dot || is_edge => others.push((row, mark(Sign::Dot), event)),
+            sign => rows[row].marks.push(mark(sign)),
         }
     }
     letter(source, &mut rows, others);
@@ -127,11 +135,11 @@ fn letter(source: &FigureSource<'_>, rows: &mut [Row], others: Vec<(usize, RowMa
     let whole = source.span().nanos().max(1) as f64;
     // A circle suffices for a connection: labels for all of them would fill the page.
     let has_words = |e: &Event| !matches!(e.kind, Kind::Appeared | Kind::Vanished);
-    let mut order: Vec<usize> = (0..others.len()).collect();
     let weight = |at: &usize| weight(others[*at].2, whole);
-    order.sort_by(|a, b| weight(b).total_cmp(&weight(a)).then(a.cmp(b)));
-    let lettered = order.into_iter().filter(|at| has_words(others[*at].2));
-    let lettered: BTreeSet<usize> = lettered.take(MOST.0).collect();
+    let lettered = (0..others.len()).filter(|at| has_words(others[*at].2));
+    let mut lettered: Vec<usize> = lettered.collect();
+    lettered.sort_by(|a, b| weight(b).total_cmp(&weight(a)).then(a.cmp(b)));
+    lettered.truncate(MOST.0);
     for (at, (row, mut mark, event)) in others.into_iter().enumerate() {
         if lettered.contains(&at) {
             mark.sign = Sign::Letter;

@@ -28,9 +28,7 @@ pub(crate) fn numbered(source: &FigureSource<'_>) -> Vec<PhaseLabel> {
 pub(crate) fn named(source: &FigureSource<'_>) -> Vec<PhaseLabel> {
     let mut phases: Vec<PhaseLabel> = Vec::new();
     for (k, phase) in source.phases.iter().enumerate() {
-        let counts = [('+', phase.nodes_added), ('−', phase.nodes_removed)];
-        let counts = counts.iter().filter(|(_, many)| *many > 0 && k > 0);
-        let counts: Vec<String> = counts.map(|(sign, n)| format!("{sign}{n}")).collect();
+        let counts = counts(k, phase);
         if let Some(last) = phases.last_mut()
             && !source.is_named
             && counts.is_empty()
@@ -47,7 +45,7 @@ pub(crate) fn named(source: &FigureSource<'_>) -> Vec<PhaseLabel> {
             None => vec![name],
         };
         if !source.is_named && !counts.is_empty() {
-            names.push(counts.join(" "));
+            names.push(counts);
         }
         names.push((k + 1).to_string());
         phases.push(PhaseLabel {
@@ -56,6 +54,14 @@ pub(crate) fn named(source: &FigureSource<'_>) -> Vec<PhaseLabel> {
         });
     }
     phases
+}
+
+/// The numbers of elements that a phase adds and removes, `+4 −1`; none in the first.
+fn counts(k: usize, phase: &Phase) -> String {
+    let counts = [('+', phase.nodes_added), ('−', phase.nodes_removed)];
+    let counts = counts.iter().filter(|(_, many)| *many > 0 && k > 0);
+    let counts: Vec<String> = counts.map(|(sign, n)| format!("{sign}{n}")).collect();
+    counts.join(" ")
 }
 
 /// The elements that began or ended, in fewer and fewer words: all that the phase names, then two and one of
@@ -78,20 +84,18 @@ pub(crate) fn title(source: &FigureSource<'_>, k: usize) -> String {
     let Some(phase) = source.phases.get(k) else {
         return String::new();
     };
-    let counts = match (k, phase.nodes_added, phase.nodes_removed) {
-        (0, all, _) => format!("({all})"),
-        (_, 0, 0) => "(=)".to_owned(),
-        (_, added, 0) => format!("(+{added})"),
-        (_, 0, removed) => format!("(−{removed})"),
-        (_, added, removed) => format!("(+{added} −{removed})"),
+    let counts = match counts(k, phase) {
+        _ if k == 0 => phase.nodes_added.to_string(),
+        none if none.is_empty() => "=".to_owned(),
+        counts => counts,
     };
-    let name = if source.is_named || phase.is_ramp {
-        format!("{} ", phase.name)
-    } else {
-        String::new()
-    };
+    let is_said = source.is_named || phase.is_ramp;
+    let name = is_said.then(|| format!("{} ", phase.name));
     let again = phase.same_as.map(|k| format!(" as {}", k + 1));
-    format!("{name}{counts}{}", again.unwrap_or_default())
+    [name, Some(format!("({counts})")), again]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// Draws the titles of the phases as running text from `y` on; returns the y at which they end.

@@ -28,6 +28,12 @@ pub(crate) struct SendingBar {
     pub(crate) share: f64,
 }
 
+impl SendingBar {
+    pub(crate) fn new(span: Span, share: f64) -> Self {
+        Self { span, share }
+    }
+}
+
 /// The place of a row's name in the column of names.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Level {
@@ -91,12 +97,12 @@ impl Row {
     }
 }
 
-/// A row per role, or per topic if publishers are unknown.
-pub(crate) fn known(source: &FigureSource<'_>) -> Vec<Row> {
-    if source.knows_publishers() {
-        of_nodes(source)
-    } else {
+/// A row per topic, or per role, with its events.
+pub(crate) fn of(source: &FigureSource<'_>, by_topics: bool) -> Vec<Row> {
+    if by_topics {
         of_topics(source)
+    } else {
+        of_nodes(source)
     }
 }
 
@@ -161,10 +167,8 @@ fn row(source: &FigureSource<'_>, steps: &Steps, elements: &[Element], senders: 
     let hz = hz.reduce(|a, b| a + b);
     let pieces = summed(&rates, whole);
     let most = pieces.iter().map(|piece| piece.hz).fold(0.0, f64::max);
-    let bar = |piece: &Piece| SendingBar {
-        span: piece.span,
-        share: if most > 0.0 { piece.hz / most } else { 1.0 },
-    };
+    let share = |hz: f64| if most > 0.0 { hz / most } else { 1.0 };
+    let bar = |piece: &Piece| SendingBar::new(piece.span, share(piece.hz));
     let mut bars: Vec<SendingBar> = pieces.iter().map(bar).collect();
     if let (Some(life), Some(bar)) = (lives.last(), bars.last_mut())
         && life.end.since(bar.span.end) <= silence(whole)
@@ -212,12 +216,8 @@ fn arrowed<'t>(arrow: &str, node: &str, topics: impl Iterator<Item = &'t str>) -
 
 /// A topic's name inside the namespace of a node.
 pub(crate) fn relative<'t>(topic: &'t str, node: &str) -> &'t str {
-    let space = namespace(node);
-    let inside = if space == "/" {
-        topic.strip_prefix('/')
-    } else {
-        topic.strip_prefix(space).and_then(|t| t.strip_prefix('/'))
-    };
+    let inside = topic.strip_prefix(namespace(node).trim_end_matches('/'));
+    let inside = inside.and_then(|inside| inside.strip_prefix('/'));
     inside.unwrap_or_else(|| topic.strip_prefix('/').unwrap_or(topic))
 }
 

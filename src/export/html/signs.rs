@@ -57,10 +57,7 @@ pub(super) fn legend(views: &[&View], rate_change: f64) -> String {
 }
 
 /// The meaning of the marks that occur on the timeline, as HTML.
-pub(super) fn timeline(rows: Option<&Timeline>) -> String {
-    let Some(timeline) = rows else {
-        return String::new();
-    };
+pub(super) fn timeline(timeline: &Timeline) -> String {
     let marks = timeline.marks();
     let has = |signs: &[Sign]| marks.iter().any(|(_, mark)| signs.contains(&mark.sign));
     let mut out = String::new();
