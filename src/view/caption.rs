@@ -13,9 +13,9 @@ use crate::graph::{Element, Elements, NodeId, TopicId, Wiring};
 use crate::mission::Mission;
 use crate::mission::event_log::{Detail, EventId, EventLog, Kind, Parts};
 
-/// The largest length of a name in characters; longer ones are cut.
+/// The largest length of a name in characters; longer ones would fill a headline alone.
 const LONGEST_NAME: usize = 48;
-/// The most names in the line below the headline.
+/// The most names in the line below the headline, which also has a place and a time.
 const MOST_NAMED: usize = 3;
 
 /// The kinds of events that the log combines if several happen at once.

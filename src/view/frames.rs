@@ -59,7 +59,8 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed<'
     }
 }
 
-/// The most consecutive windows without a message that are separate frames.
+/// The most consecutive windows without a message that are separate frames: more would only
+/// lengthen an animation in which nothing moves.
 const MOST_EMPTY: usize = 10;
 
 /// Marks each long run of windows without messages and changes as one time.

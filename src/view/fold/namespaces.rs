@@ -1,4 +1,7 @@
 //! Namespaces: those that are collapsed to one box, in which order, and those with a box around their members.
+//!
+//! `/nav` collapsed is one box for `/nav/planner`, `/nav/costmap` and the topic `/nav/plan` between them; `/nav/goal`, which
+//! comes from outside, stays beside it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
