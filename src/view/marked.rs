@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::items::{Place, Viewed};
 use super::state::{LivingItems, Now};
-use super::{Arrow, ArrowId, ArrowKind, Counts, Headline, ItemId, ItemKind, Mark, Shown, TopicRow};
+use super::{Arrow, ArrowId, ArrowKind, Counts, Headline, ItemId, ItemKind, Mark, Shown};
 use crate::base::time::{Span, Stamp};
 use crate::graph::Element;
 use crate::mission::EventLog;
@@ -293,12 +293,10 @@ impl WindowChanges {
         if shown.mark.is_none_or(|mark| mark.class() != "changed") {
             return;
         }
-        let lives = |items: &LivingItems, row: &TopicRow| {
-            let all = items.topics.get(ArrowId(shown.id));
-            all.and_then(|all| all.get(row.topic as usize)) == Some(&true)
-        };
+        let id = ArrowId(shown.id);
         for row in &mut shown.topics {
-            let there = (lives(&self.before, row), lives(&self.after, row));
+            let has = |items: &LivingItems| items.has_topic(viewed, id, row.topic);
+            let there = (has(&self.before), has(&self.after));
             match there {
                 (false, true) => row.mark = Some(Mark::Added),
                 (true, false) => row.mark = Some(Mark::Removed),

@@ -31,7 +31,7 @@ pub struct CardRow {
 /// The least number of boxes that a hub is connected to, and of outermost namespaces (or the outside) that
 /// contain them. Five lines to one topic are easy to follow, and those inside one namespace cross no other.
 const FEWEST_ENDS: usize = 6;
-const FEWEST_HOMES: usize = 2;
+const FEWEST_SPACES: usize = 2;
 
 impl View {
     /// Makes topics with one known endpoint rows of its box and, if `hides_infrastructure`, hubs rows of all
@@ -96,11 +96,11 @@ impl View {
     /// Whether a topic connected to these boxes is a hub: many, in several outermost namespaces.
     fn is_hub<'a>(&self, owners: impl Iterator<Item = &'a ItemId>) -> bool {
         let names = owners.map(|at| &*self.items[*at].name);
-        let homes: Vec<&str> = names
+        let spaces: Vec<&str> = names
             .map(|name| namespace(name).split('/').nth(1).unwrap_or_default())
             .collect();
-        let different: BTreeSet<&&str> = homes.iter().collect();
-        homes.len() >= FEWEST_ENDS && different.len() >= FEWEST_HOMES
+        let different: BTreeSet<&&str> = spaces.iter().collect();
+        spaces.len() >= FEWEST_ENDS && different.len() >= FEWEST_SPACES
     }
 
     /// The topic of an arrow with the box at its other end.
