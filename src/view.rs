@@ -11,7 +11,6 @@ mod marked;
 pub(crate) mod news;
 mod omitted;
 mod options;
-pub(crate) mod runs;
 mod shown;
 mod state;
 mod steady;
@@ -34,9 +33,9 @@ pub(crate) use listed::{DrawnPart, drawn_part};
 pub use marked::Lasting;
 pub(crate) use omitted::{none_pass, nothing, unmatched, unmatched_topics};
 pub use options::{Grouping, Hide, Mode, NameFilter, ViewOptions};
-pub(crate) use shown::both;
 use shown::sum;
 pub use shown::{Looks, Mark, Members, Shown, TopicRow};
+pub(crate) use shown::{STEPS, both, decades};
 pub use still::Presence;
 pub(crate) use still::union;
 
@@ -65,52 +64,40 @@ pub(crate) fn outline(mission: &Mission, options: &ViewOptions) -> View {
 }
 
 fn assembled(viewed: items::Viewed<'_>, options: &ViewOptions, frames: frames::Frames) -> View {
-    let mut list = frames.list;
-    let mut drawn = fold::rows::Drawn {
+    let mut view = View {
         items: viewed.items,
         arrows: viewed.arrows,
         items_shown: frames.items,
         arrows_shown: frames.arrows,
+        frames: frames.list,
+        ..View::default()
     };
-    let boxes = drawn.items.len() - viewed.in_words;
-    let in_words = drawn.items.split_off(boxes);
-    let shown_in_words = drawn
+    let boxes = view.items.len() - viewed.in_words;
+    let words = view.items.split_off(boxes);
+    let words_shown = view
         .items_shown
-        .split_off(boxes.min(drawn.items_shown.len()));
-    let rows = if options.is_picture {
-        let rows = drawn.fold_leaves(options.hide.quiet);
-        drawn.join_twins();
-        rows
-    } else {
-        Vec::new()
-    };
-    let fleets = viewed.fleets.all.iter().map(|fleet| &*fleet.name).collect();
-    let mut namespaces =
-        fold::namespaces::clusters(&mut drawn.items, options.group.namespaces, &fleets);
+        .split_off(boxes.min(view.items_shown.len()));
+    if options.is_picture {
+        view.fold_leaves(options.hide.quiet);
+        view.join_twins();
+    }
+    let fleets = &viewed.fleets.all;
+    let names = fleets.iter().map(|fleet| &*fleet.name).collect();
+    let depth = options.group.namespaces;
+    view.namespaces = fold::namespaces::clusters(&mut view.items, depth, &names);
     let mut equal = Vec::new();
-    for namespace in &mut namespaces {
-        let fleets = viewed.fleets.all.iter().zip(0_usize..);
-        if let Some((fleet, at)) = fleets.into_iter().find(|(f, _)| f.name == namespace.name) {
-            namespace.replicas = fleet.indices();
+    for namespace in &mut view.namespaces {
+        if let Some(at) = fleets.iter().position(|f| f.name == namespace.name) {
+            namespace.replicas = fleets[at].indices();
             equal.push(at);
         }
     }
-    for frame in &mut list {
+    for frame in &mut view.frames {
         let member_list = |at: &usize| frame.member_lists.get(*at).cloned().unwrap_or_default();
         frame.member_lists = equal.iter().map(member_list).collect();
     }
-    View {
-        also: listed::also_here(in_words, shown_in_words, &namespaces),
-        rows,
-        items: drawn.items,
-        arrows: drawn.arrows,
-        namespaces,
-        frames: list,
-        items_shown: drawn.items_shown,
-        arrows_shown: drawn.arrows_shown,
-        presences: ById::default(),
-        compares: false,
-    }
+    view.also = listed::also_here(words, words_shown, &view.namespaces);
+    view
 }
 
 /// The kind of element that a box of the picture represents.
@@ -282,9 +269,7 @@ impl Arrow {
             topic.to_string()
         })
     }
-}
 
-impl Arrow {
     /// The names of the topics that a bundle carries in a window.
     pub(crate) fn topics_in(&self, shown: &Shown) -> Vec<&str> {
         let names = shown
@@ -433,13 +418,10 @@ impl View {
     /// The index of the window with most headlines, the first of several; [`View::busiest`] if there are
     /// none.
     pub(crate) fn busiest_change(&self) -> usize {
-        let mut best = (self.busiest(), 0);
-        for (at, frame) in self.frames.iter().enumerate() {
-            if frame.headlines.len() > best.1 {
-                best = (at, frame.headlines.len());
-            }
-        }
-        best.0
+        let headlines = |k: &usize| self.frames[*k].headlines.len();
+        let best = (0..self.frames.len()).rev().max_by_key(headlines);
+        let best = best.filter(|k| headlines(k) > 0);
+        best.unwrap_or_else(|| self.busiest())
     }
 
     /// Whether a part of it represents several elements that could be drawn separately: a namespace, a fleet,

@@ -40,7 +40,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("graph", &[&["elements", "graphs", "history", "per_element"], &["build", "diff", "window"]]),
     ("mission", &[&["event_log"], &["json", "phases"], &["events"], &["info"]]),
     ("view", &[
-        &["options", "runs", "shown"],
+        &["options", "shown"],
         &["choose", "steady"],
         &["fold"],
         &["listed"],

@@ -4,6 +4,7 @@
 //! joined in order. [`data`] defines the data for the script.
 
 mod data;
+mod element_runs;
 pub(crate) mod encoder;
 mod signs;
 mod table;
@@ -24,8 +25,8 @@ use crate::draw::text;
 use crate::draw::topic_timeline::Overview;
 use crate::export::sequence::Sequence;
 use crate::graph::Id as _;
-use crate::view::runs::{ElementRuns, ViewRuns};
 use crate::view::{ArrowId, ItemId, View};
+use element_runs::{ElementRuns, ViewRuns};
 
 const PAGE: &str = include_str!("html/player/page.html");
 const LOOK: &str = include_str!("html/player/page.css");

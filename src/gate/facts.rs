@@ -13,7 +13,7 @@ use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::{Bound, Sending};
-use crate::graph::{ById, Edge, EdgeId, Element, NodeId, PerElement, Row, State, Topic, TopicId};
+use crate::graph::{ById, EdgeId, Element, NodeId, PerElement, Row, State, TopicId, Wiring};
 use crate::mission::event_log::{Event, Kind};
 use crate::mission::{Mission, Window};
 
@@ -30,8 +30,7 @@ pub(crate) struct Facts<'a> {
     roles: BTreeMap<&'a str, Vec<NodeId>>,
     /// The role of each of them.
     names: BTreeMap<&'a str, &'a str>,
-    /// The publications and the subscriptions of each topic.
-    edges: [ById<TopicId, Vec<EdgeId>>; 2],
+    wiring: Wiring,
 }
 
 /// A role of a mission and its nodes.
@@ -199,8 +198,7 @@ impl<'a> Facts<'a> {
             is_rewritten,
             roles,
             names,
-            edges: [&elements.publishes, &elements.subscribes]
-                .map(|edges| by_topic(edges, &elements.topics)),
+            wiring: elements.wiring(|_, _| true),
         }
     }
 
@@ -260,15 +258,11 @@ impl<'a> Facts<'a> {
     /// Whether a topic was observed, not only declared: with messages, an observed publisher, or no observed
     /// subscriber.
     pub(crate) fn is_there(&self, topic: TopicId) -> bool {
-        let elements = &self.mission.elements;
-        let any = |of: usize, edges: &ById<EdgeId, Edge>| {
-            let mut own = self.edges[of][topic].iter();
-            own.any(|id| is_seen(edges[*id].seen.evidence))
-        };
-        is_seen(elements.topics[topic].seen.evidence)
+        let any = |peers: &[Peer]| peers.iter().any(|peer| is_seen(peer.evidence));
+        is_seen(self.mission.elements.topics[topic].seen.evidence)
             && (self.messages[topic] > 0
-                || any(0, &elements.publishes)
-                || !any(1, &elements.subscribes))
+                || any(&self.publishers(topic))
+                || !any(&self.subscribers(topic)))
     }
 
     /// The number of messages of a topic.
@@ -322,31 +316,30 @@ impl<'a> Facts<'a> {
         all.filter(|id| !self.is_housekeeping(*id) && self.messages(*id) > 0)
     }
 
-    /// The publishers of a topic.
+    /// The publishers of a topic, except unnamed nodes.
     pub(crate) fn publishers(&self, topic: TopicId) -> Vec<Peer> {
-        let edges = &self.mission.elements.publishes;
-        self.peers(&self.edges[0][topic], edges, Element::Publish)
+        let nodes = self.wiring.publishers[topic].iter();
+        let edge = |node| self.mission.elements.publication(node, topic);
+        let peers = nodes.filter_map(|node| self.peer(*node, edge(*node)?, Element::Publish));
+        peers.collect()
     }
 
-    /// The subscribers of a topic.
+    /// The subscribers of a topic, except unnamed nodes.
     pub(crate) fn subscribers(&self, topic: TopicId) -> Vec<Peer> {
-        let edges = &self.mission.elements.subscribes;
-        self.peers(&self.edges[1][topic], edges, Element::Subscribe)
+        let nodes = self.wiring.subscribers[topic].iter();
+        let edge = |node| self.mission.elements.subscription(topic, node);
+        let peers = nodes.filter_map(|node| self.peer(*node, edge(*node)?, Element::Subscribe));
+        peers.collect()
     }
 
-    fn peers(
-        &self,
-        own: &[EdgeId],
-        edges: &ById<EdgeId, Edge>,
-        element: fn(EdgeId) -> Element,
-    ) -> Vec<Peer> {
-        let peer = |id: &EdgeId| Peer {
-            node: edges[*id].node,
-            edge: *id,
-            confidence: self.confidence(element(*id)),
-            evidence: edges[*id].seen.evidence,
-        };
-        own.iter().map(peer).collect()
+    fn peer(&self, node: NodeId, edge: EdgeId, element: fn(EdgeId) -> Element) -> Option<Peer> {
+        let evidence = self.mission.elements.evidence(element(edge));
+        (!evidence.is_guess()).then(|| Peer {
+            node,
+            edge,
+            confidence: self.confidence(element(edge)),
+            evidence,
+        })
     }
 
     /// The roles of these, without tools and without what is only inferred.
@@ -652,14 +645,13 @@ impl<'a> Facts<'a> {
     /// that feed them.
     pub(crate) fn cause_for_topic(&self, topic: TopicId, around: Span) -> Option<Cause> {
         let direct: BTreeSet<NodeId> = self.publishers(topic).iter().map(|p| p.node).collect();
-        let fed: BTreeSet<TopicId> = {
-            let edges = self.mission.elements.subscribes.iter();
-            let own = edges.filter(|e| direct.contains(&e.node) && e.topic != topic);
-            own.map(|e| e.topic).collect()
-        };
+        let fed = direct
+            .iter()
+            .flat_map(|node| &self.wiring.subscribed[*node]);
+        let fed: BTreeSet<&TopicId> = fed.filter(|id| **id != topic).collect();
         let feeders: BTreeSet<NodeId> = fed
             .iter()
-            .flat_map(|topic| self.publishers(*topic))
+            .flat_map(|topic| self.publishers(**topic))
             .map(|p| p.node)
             .filter(|node| !direct.contains(node))
             .collect();
@@ -699,21 +691,6 @@ impl<'a> Facts<'a> {
 fn messages(mission: &Mission, what: Element) -> u64 {
     let rows = mission.graphs.rows(what);
     rows.filter_map(|(_, row)| row.count).sum()
-}
-
-/// The edges of each topic, except those of unnamed nodes.
-fn by_topic(
-    edges: &ById<EdgeId, Edge>,
-    topics: &ById<TopicId, Topic>,
-) -> ById<TopicId, Vec<EdgeId>> {
-    let mut all = ById::like(topics, Vec::new());
-    for (id, edge) in edges
-        .with_ids()
-        .filter(|(_, edge)| !edge.seen.evidence.is_guess())
-    {
-        all[edge.topic].push(id);
-    }
-    all
 }
 
 /// The fewest expected messages of an even topic by which a window cut by the mission's end is checked: one more or

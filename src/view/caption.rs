@@ -1,5 +1,6 @@
 //! The words of a window: its events as phrases for the headline, and the line below it.
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::mem::discriminant;
 
@@ -13,9 +14,9 @@ use crate::graph::{Element, Elements, NodeId, TopicId, Wiring};
 use crate::mission::Mission;
 use crate::mission::event_log::{Detail, EventId, EventLog, Kind, Parts};
 
-/// The largest length of a name in characters; longer ones are cut.
+/// The largest length of a name in characters; longer ones would fill a headline alone.
 const LONGEST_NAME: usize = 48;
-/// The most names in the line below the headline.
+/// The most names in the line below the headline, which also has a place and a time.
 const MOST_NAMED: usize = 3;
 
 /// The kinds of events that the log combines if several happen at once.
@@ -33,7 +34,9 @@ pub(crate) struct CaptionWriter<'a> {
     is_still: bool,
     /// The last event of the windows so far.
     last: Option<Stamp>,
-    audience: Audience<'a>,
+    wiring: Wiring,
+    /// The namespace below which the names of the present window are written.
+    home: &'a str,
 }
 
 /// The events of a window, in the order of their phrases, each with the values that are equal within one
@@ -50,7 +53,8 @@ impl<'a> CaptionWriter<'a> {
             start: mission.span.start,
             is_still: mission.windows.len() == 1,
             last: None,
-            audience: Audience::new(&mission.elements),
+            wiring: mission.elements.wiring(|_, _| true),
+            home: "",
         }
     }
 
@@ -58,12 +62,12 @@ impl<'a> CaptionWriter<'a> {
     pub(crate) fn write(&mut self, frame: &mut Frame) {
         let whats = frame.headlines.iter().map(|h| h.what);
         let whats = whats.chain(frame.lasting.iter().map(|l| l.what));
-        let home: &'a str = home(whats.filter_map(|what| self.subject(what)));
+        self.home = home(whats.filter_map(|what| self.subject(what)));
         let mut groups = Groups::new();
         for headline in &frame.headlines {
             let part = self.event(headline.event).map(|e| Part::of(e, frame.span));
-            let phrase = self.phrase(headline, part.unwrap_or(Part::Whole), home);
-            add(&mut groups, phrase, headline.event);
+            let said = self.phrase(headline, part.unwrap_or(Part::Whole));
+            said.add(&mut groups, headline.event);
             // Equal simultaneous events of other elements are parts of it.
             for id in self.parts.get(&headline.event).into_iter().flatten() {
                 if let Some(part) = self.event(*id)
@@ -77,16 +81,16 @@ impl<'a> CaptionWriter<'a> {
                         what: part.what,
                         ..*headline
                     };
-                    let phrase = self.phrase(&other, Part::Whole, home);
-                    add(&mut groups, phrase, headline.event);
+                    let said = self.phrase(&other, Part::Whole);
+                    said.add(&mut groups, headline.event);
                 }
             }
         }
         for lasting in &frame.lasting {
-            add(&mut groups, self.lasting(lasting, home), lasting.event);
+            self.lasting(lasting).add(&mut groups, lasting.event);
         }
         frame.caption = groups.into_values().map(plural).collect();
-        frame.note = self.note(frame, home);
+        frame.note = self.note(frame);
     }
 
     fn event(&self, id: EventId) -> Option<&'a crate::mission::event_log::Event> {
@@ -95,7 +99,7 @@ impl<'a> CaptionWriter<'a> {
 
     /// The line below the headline: `/robot1 · 4:26 · arm_controller gets no detections`; in a window in which nothing
     /// changes `no change since 3:20`.
-    fn note(&mut self, frame: &Frame, home: &str) -> String {
+    fn note(&mut self, frame: &Frame) -> String {
         if self.log.compares {
             let none = frame.caption.is_empty().then_some("no difference");
             return none.unwrap_or_default().to_owned();
@@ -115,7 +119,7 @@ impl<'a> CaptionWriter<'a> {
                 None => "no change yet".to_owned(),
             };
         }
-        let mut parts = vec![words::shorten(home, LONGEST_NAME).into_owned()];
+        let mut parts = vec![clip(self.home)];
         if let Some((first, last)) = span {
             self.last = Some(last);
             let (first, last) = (self.moment(first), self.moment(last));
@@ -133,7 +137,7 @@ impl<'a> CaptionWriter<'a> {
         });
         let away = frame.lasting.iter().filter(|l| l.ended.is_none());
         let mut whats = leaves.map(|h| h.what).chain(away.map(|l| l.what));
-        parts.extend(whats.find_map(|what| self.missed(what, home)));
+        parts.extend(whats.find_map(|what| self.missed(what)));
         parts.retain(|part| !part.is_empty());
         parts.join(" · ")
     }
@@ -148,158 +152,172 @@ impl<'a> CaptionWriter<'a> {
     }
 
     /// The subscribers without messages while a node is away: `a, b get no detections`; `None` if none is known.
-    fn missed(&self, what: Element, home: &str) -> Option<String> {
+    fn missed(&self, what: Element) -> Option<String> {
         let Element::Node(node) = what else {
             return None;
         };
-        let (topic, nodes) = self.audience.of(node)?;
+        let (topic, nodes) = self.audience(node)?;
         let names: Vec<String> = nodes
             .iter()
             .filter(|id| self.viewed.sees(Element::Node(**id)))
-            .map(|id| self.name(Element::Node(*id), home))
+            .map(|id| self.name(Element::Node(*id)))
             .collect();
         let gets = match names.len() {
             0 => return None,
             1 => "gets",
             _ => "get",
         };
-        let topic = self.name(Element::Topic(topic), home);
+        let topic = self.name(Element::Topic(topic));
         Some(format!(
             "{} {gets} no {topic}",
             words::some_of(&names, MOST_NAMED)
         ))
     }
 
+    /// Of the topics that only a node (or other runs of it) publishes, the one with most subscribers, and these subscribers:
+    /// they lack messages while the node is away.
+    fn audience(&self, node: NodeId) -> Option<(TopicId, &[NodeId])> {
+        let role = |id: NodeId| self.elements.nodes.get(id).map(|n| &n.role);
+        let own = self.wiring.published.get(node)?.iter().filter(|topic| {
+            let mut publishers = self.wiring.publishers[**topic].iter();
+            !is_quiet(self.elements.topics[**topic].name.as_str())
+                && publishers.all(|other| role(*other) == role(node))
+        });
+        let missed = own.map(|topic| (*topic, &self.wiring.subscribers[*topic][..]));
+        let missed = missed.filter(|(_, nodes)| !nodes.is_empty());
+        missed.max_by_key(|(topic, nodes)| (nodes.len(), Reverse(*topic)))
+    }
+
     /// An event of an earlier window in this one.
-    fn lasting(&self, lasting: &Lasting, home: &str) -> (u8, Phrase) {
-        let name = self.name(lasting.what, home);
+    fn lasting(&self, lasting: &Lasting) -> Said {
+        let name = self.name(lasting.what);
         match lasting.ended {
-            None => (12, said(' ', "", name, "still away")),
+            None => Said::new(12, ' ', name, "still away"),
             Some(end) => {
                 let away = words::duration(end.since(lasting.since));
-                (6, said(' ', "", name, &format!("back after {away}")))
+                Said::new(6, ' ', name, &format!("back after {away}"))
             }
         }
     }
 
-    /// The rank of a headline among the phrases, and its phrase. Ends come before beginnings.
-    fn phrase(&self, headline: &Headline, part: Part, home: &str) -> (u8, Phrase) {
-        let name = self.name(headline.what, home);
-        let kind = headline.kind;
+    /// The words for a headline. Ends come before beginnings.
+    fn phrase(&self, headline: &Headline, part: Part) -> Said {
+        let name = self.name(headline.what);
+        let event = self.event(headline.event);
         if self.log.compares {
-            return self.compared(headline, home);
+            return self.compared(headline);
         }
         if part == Part::Leaves {
-            return (1, said('−', "", name, "goes away"));
+            return Said::new(1, '−', name, "goes away");
         }
-        match kind {
-            Kind::Stopped => (0, said('−', "", name, "stops")),
-            Kind::Vanished | Kind::Appeared => self.edge(headline, home),
-            Kind::Silent => (3, said(' ', "", name, "falls silent")),
-            Kind::Started => (4, said('+', "", name, "starts")),
+        match headline.kind {
+            Kind::Stopped => Said::new(0, '−', name, "stops"),
+            Kind::Vanished | Kind::Appeared => self.edge(headline),
+            Kind::Silent => Said::new(3, ' ', name, "falls silent"),
+            Kind::Started => Said::new(4, '+', name, "starts"),
             Kind::Restarted => {
-                let event = self.event(headline.event);
                 let away = event.and_then(|e| Some(e.until?.since(e.time)));
-                let away = away.filter(|nanos| *nanos > 0);
-                let tail = away.map_or_else(String::new, |nanos| {
-                    format!("after {}", words::duration(nanos))
+                let away = away.filter(|nanos| *nanos > 0).map(words::duration);
+                let tail = away.map_or("restarts".to_owned(), |away| {
+                    format!("restarts after {away}")
                 });
-                (
-                    7,
-                    said(' ', "", name, format!("restarts {tail}").trim_end()),
-                )
+                Said::new(7, ' ', name, &tail)
             }
-            Kind::Starved => (9, said(' ', "", name, "starves a subscriber")),
-            Kind::Duplicate => (9, said(' ', "", name, "is used by two nodes")),
-            Kind::Lost => (12, said(' ', "", name, "lost messages in the recorder")),
+            Kind::Starved => Said::new(9, ' ', name, "starves a subscriber"),
+            Kind::Duplicate => Said::new(9, ' ', name, "is used by two nodes"),
+            Kind::Lost => Said::new(12, ' ', name, "lost messages in the recorder"),
             Kind::HandedOver | Kind::Lifecycle | Kind::Type | Kind::Qos | Kind::Rate => {
-                self.changed(headline, name, home)
+                self.changed(headline)
             }
         }
     }
 
-    fn changed(&self, headline: &Headline, name: String, home: &str) -> (u8, Phrase) {
+    fn changed(&self, headline: &Headline) -> Said {
+        let name = self.name(headline.what);
         match self.event(headline.event).map(|e| &e.detail) {
             Some(Detail::Rates { from_hz, to_hz }) => {
                 let change = words::rate_change(*from_hz, *to_hz);
-                (11, said(' ', "", format!("{name} {change}"), ""))
+                Said::new(11, ' ', format!("{name} {change}"), "")
             }
             Some(Detail::Senders { from, to }) if !from.is_empty() && !to.is_empty() => {
                 let verb = if to.len() == 1 { "takes" } else { "take" };
-                let lead = format!("{} {verb} over", self.people(to, home));
-                let tail = format!("from {}", self.people(from, home));
-                (8, said(' ', &lead, name, &tail))
+                let tail = format!("from {}", self.people(from));
+                Said {
+                    lead: format!("{} {verb} over", self.people(to)),
+                    ..Said::new(8, ' ', name, &tail)
+                }
             }
-            Some(Detail::Senders { .. }) => (8, said(' ', "", name, "handed over")),
+            Some(Detail::Senders { .. }) => Said::new(8, ' ', name, "handed over"),
             Some(Detail::Values { from, to }) if headline.kind == Kind::Lifecycle => {
-                let tail = match &**from {
-                    "" => format!("→ {}", clip(to)),
-                    from => format!("{} → {}", clip(from), clip(to)),
-                };
-                (9, said(' ', "", name, &tail))
+                let change = format!("{} → {}", clip(from), clip(to));
+                Said::new(9, ' ', name, change.trim_start())
             }
             _ if headline.kind == Kind::Qos => {
-                (10, said(' ', "", name, "with another quality of service"))
+                Said::new(10, ' ', name, "with another quality of service")
             }
-            _ => (10, said(' ', "", name, "with another type")),
+            _ => Said::new(10, ' ', name, "with another type"),
         }
     }
 
     /// A topic that begins or ends, or a connection of a node that stays.
-    fn edge(&self, headline: &Headline, home: &str) -> (u8, Phrase) {
-        let begins = headline.kind == Kind::Appeared;
-        let (place, sign) = if begins { (5, '+') } else { (2, '−') };
-        let name = self.name(headline.what, home);
-        let (Some(node), Some(_)) = self.elements.ends(headline.what) else {
-            let verb = if begins { "appears" } else { "ends" };
-            return (place, said(sign, "", name, verb));
+    fn edge(&self, headline: &Headline) -> Said {
+        let (rank, sign, verb, not) = match headline.kind {
+            Kind::Appeared => (5, '+', "appears", ""),
+            _ => (2, '−', "ends", "no longer "),
         };
-        let verb = match (headline.what, begins) {
-            (Element::Publish(_), true) => "publishes",
-            (Element::Publish(_), false) => "no longer publishes",
-            (_, true) => "subscribes to",
-            (_, false) => "no longer subscribes to",
+        let name = self.name(headline.what);
+        match self.subject_of_edge(headline.what, not) {
+            None => Said::new(rank, sign, name, verb),
+            Some(lead) => Said {
+                lead,
+                ..Said::new(rank, sign, name, "")
+            },
+        }
+    }
+
+    /// The words before the topic of an edge: `controller no longer subscribes to`; `None` for a node or topic.
+    fn subject_of_edge(&self, what: Element, not: &str) -> Option<String> {
+        let verb = match what {
+            Element::Publish(_) => "publishes",
+            Element::Subscribe(_) => "subscribes to",
+            Element::Node(_) | Element::Topic(_) => return None,
         };
-        let lead = format!("{} {verb}", self.name(Element::Node(node), home));
-        (place, said(sign, &lead, name, ""))
+        let node = self.elements.ends(what).0?;
+        Some(format!("{} {not}{verb}", self.name(Element::Node(node))))
     }
 
     /// A difference between two missions.
-    fn compared(&self, headline: &Headline, home: &str) -> (u8, Phrase) {
-        let name = self.name(headline.what, home);
-        let (place, sign) = match headline.kind {
+    fn compared(&self, headline: &Headline) -> Said {
+        let name = self.name(headline.what);
+        let (rank, sign) = match headline.kind {
             Kind::Stopped | Kind::Vanished => (0, '−'),
             Kind::Started | Kind::Appeared => (1, '+'),
-            Kind::Rate | Kind::HandedOver => return self.changed(headline, name, home),
+            Kind::Rate | Kind::HandedOver => return self.changed(headline),
             _ => {
                 let event = self.event(headline.event);
                 let Some(Detail::Values { from, to }) = event.map(|e| &e.detail) else {
-                    return self.changed(headline, name, home);
+                    return self.changed(headline);
                 };
                 let change = format!("{name} {} → {}", clip(from), clip(to));
-                return (9, said(' ', "", change.replace("  ", " "), ""));
+                return Said::new(9, ' ', change.replace("  ", " "), "");
             }
         };
-        let lead = match (headline.what, self.elements.ends(headline.what).0) {
-            (Element::Publish(_), Some(node)) => {
-                format!("{} publishes", self.name(Element::Node(node), home))
-            }
-            (Element::Subscribe(_), Some(node)) => {
-                format!("{} subscribes to", self.name(Element::Node(node), home))
-            }
-            _ => String::new(),
-        };
-        (place, said(sign, &lead, name, self.log.word(headline.kind)))
+        Said {
+            lead: self.subject_of_edge(headline.what, "").unwrap_or_default(),
+            ..Said::new(rank, sign, name, self.log.word(headline.kind))
+        }
     }
 
     /// The name of a node (as a role) or topic below `home`, in full outside it; of an edge, that of its topic.
-    fn name(&self, what: Element, home: &str) -> String {
+    fn name(&self, what: Element) -> String {
         let name = match what {
             Element::Node(id) => self.node_name(id),
             _ => self.elements.names(what).1,
         };
         let name = without_transport(name.unwrap_or_default());
-        let below = name.strip_prefix(home).filter(|_| !home.is_empty());
+        let below = name
+            .strip_prefix(self.home)
+            .filter(|_| !self.home.is_empty());
         let below = below.and_then(|rest| rest.strip_prefix('/'));
         clip(below.unwrap_or(name))
     }
@@ -322,38 +340,49 @@ impl<'a> CaptionWriter<'a> {
         }
     }
 
-    fn people(&self, nodes: &[NodeId], home: &str) -> String {
+    fn people(&self, nodes: &[NodeId]) -> String {
         let names: Vec<String> = nodes
             .iter()
-            .map(|id| self.name(Element::Node(*id), home))
+            .map(|id| self.name(Element::Node(*id)))
             .collect();
         words::some_of(&names, 2)
     }
 }
 
-fn said(sign: char, lead: &str, name: String, tail: &str) -> Phrase {
-    Phrase {
-        sign,
-        lead: lead.to_owned(),
-        names: vec![name],
-        events: Vec::new(),
-        tail: tail.to_owned(),
-    }
+/// One event in words, with its rank among the phrases of a window.
+struct Said {
+    rank: u8,
+    sign: char,
+    lead: String,
+    name: String,
+    tail: String,
 }
 
-/// Adds the phrase of an event to an equal one.
-fn add(groups: &mut Groups, (place, phrase): (u8, Phrase), event: EventId) {
-    let key = (place, [phrase.lead.clone(), phrase.tail.clone()]);
-    let names = phrase.names.clone();
-    let all = groups.entry(key).or_insert(Phrase {
-        names: Vec::new(),
-        ..phrase
-    });
-    for name in names {
-        if let Some(at) = all.names.iter().position(|other| *other == name) {
+impl Said {
+    fn new(rank: u8, sign: char, name: String, tail: &str) -> Self {
+        let (lead, tail) = (String::new(), tail.to_owned());
+        Self {
+            rank,
+            sign,
+            lead,
+            name,
+            tail,
+        }
+    }
+
+    /// Adds it to an equal phrase.
+    fn add(self, groups: &mut Groups, event: EventId) {
+        let key = (self.rank, [self.lead.clone(), self.tail.clone()]);
+        let all = groups.entry(key).or_insert(Phrase {
+            sign: self.sign,
+            lead: self.lead,
+            tail: self.tail,
+            ..Phrase::default()
+        });
+        if let Some(at) = all.names.iter().position(|other| *other == self.name) {
             all.events[at].push(event);
         } else {
-            all.names.push(name);
+            all.names.push(self.name);
             all.events.push(vec![event]);
         }
     }
@@ -383,38 +412,9 @@ fn clip(name: &str) -> String {
     words::shorten(name, LONGEST_NAME).into_owned()
 }
 
-/// The subscribers of topics with one publisher.
-pub(super) struct Audience<'a> {
-    elements: &'a Elements,
-    wiring: Wiring,
-}
-
-impl<'a> Audience<'a> {
-    pub(super) fn new(elements: &'a Elements) -> Self {
-        let wiring = elements.wiring(|_, _| true);
-        Self { elements, wiring }
-    }
-
-    /// Of the topics that only this node (or other runs of it) publishes, the one with most subscribers, and
-    /// these subscribers.
-    pub(super) fn of(&self, node: NodeId) -> Option<(TopicId, &[NodeId])> {
-        let topics = self.wiring.published.get(node)?.iter().copied();
-        let name = |topic: TopicId| self.elements.topics.get(topic).map(|t| &t.name);
-        let role = |id: NodeId| self.elements.nodes.get(id).map(|n| &n.role);
-        let own = topics.filter(|topic| {
-            let is_shown = name(*topic).is_some_and(|name| !is_quiet(name.as_str()));
-            let mut publishers = self.wiring.publishers[*topic].iter();
-            is_shown && publishers.all(|other| role(*other) == role(node))
-        });
-        let missed = own.map(|topic| (topic, &self.wiring.subscribers[topic][..]));
-        let missed = missed.filter(|(_, nodes)| !nodes.is_empty());
-        missed.max_by_key(|(topic, nodes)| (nodes.len(), std::cmp::Reverse(*topic)))
-    }
-}
-
 /// The namespace below which names are written without it: the one around all names that have one, else that
 /// of most of them; empty if all are at the root.
-pub(super) fn home<'n>(names: impl Iterator<Item = &'n str>) -> &'n str {
+fn home<'n>(names: impl Iterator<Item = &'n str>) -> &'n str {
     let spaces = names.map(|name| namespace(without_transport(name)));
     let spaces: Vec<&str> = spaces.filter(|space| *space != "/").collect();
     let Some(first) = spaces.first() else {
@@ -436,7 +436,7 @@ pub(super) fn home<'n>(names: impl Iterator<Item = &'n str>) -> &'n str {
 }
 
 /// The namespace around two others; empty for the root.
-pub(super) fn shared<'n>(a: &'n str, b: &str) -> &'n str {
+fn shared<'n>(a: &'n str, b: &str) -> &'n str {
     let mut end = 0;
     for (x, y) in a.split('/').zip(b.split('/')) {
         if x != y {
@@ -448,7 +448,7 @@ pub(super) fn shared<'n>(a: &'n str, b: &str) -> &'n str {
 }
 
 /// The name of an image topic without its transport.
-pub(super) fn without_transport(name: &str) -> &str {
+fn without_transport(name: &str) -> &str {
     const TRANSPORTS: [&str; 3] = ["/compressed", "/compressedDepth", "/theora"];
     let cut = TRANSPORTS.iter().find_map(|end| name.strip_suffix(end));
     cut.filter(|rest| !rest.is_empty()).unwrap_or(name)

@@ -5,7 +5,7 @@ use super::items::Viewed;
 use super::listed::beginning;
 use super::marked::{LastingEvents, WindowChanges, WindowMarks};
 use super::shown::{Looks, LooksWriter};
-use super::state::{Alive, ItemTurns, LivingItems, Now};
+use super::state::{Alive, Lifetimes, LivingItems, Now};
 use super::steady::{Lengths, stable};
 use super::{ArrowId, Counts, Crowd, ItemId, Lasting, Mark, MemberState, Shown, ViewOptions};
 use crate::base::time::{Span, Stamp};
@@ -59,7 +59,8 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed<'
     }
 }
 
-/// The most consecutive windows without a message that are separate frames.
+/// The most consecutive windows without a message that are separate frames: more would only
+/// lengthen an animation in which nothing moves.
 const MOST_EMPTY: usize = 10;
 
 /// Marks each long run of windows without messages and changes as one time.
@@ -101,7 +102,7 @@ fn changing(mission: &Mission) -> Vec<bool> {
 struct ShownWindows<'a> {
     mission: &'a Mission,
     viewed: &'a Viewed<'a>,
-    lives: ItemTurns<'a>,
+    lives: Lifetimes<'a>,
     parts: Parts,
     lasting: LastingEvents<'a>,
     /// A beginning before this time is not a change.
@@ -164,7 +165,7 @@ impl<'a> ShownWindows<'a> {
         Self {
             mission,
             viewed,
-            lives: ItemTurns::new(mission),
+            lives: Lifetimes::new(mission),
             parts: mission.log.all_parts(),
             lasting: LastingEvents::new(&mission.log, viewed),
             beginning: beginning(mission),
@@ -198,9 +199,10 @@ impl<'a> ShownWindows<'a> {
         let paused = self.lives.paused(span, &alive);
         let (before, after) = (self.lives.before(span.start), self.lives.before(span.end));
         self.now.live(span, alive, paused);
+        self.member_lists = member_lists(self.viewed, &before, &after, window.index == 0);
         self.changes = WindowChanges {
-            before: LivingItems::of(self.viewed, &before),
-            after: LivingItems::of(self.viewed, &after),
+            before: LivingItems::of(self.viewed, before),
+            after: LivingItems::of(self.viewed, after),
             marks: WindowMarks::new(
                 &self.mission.log,
                 (&self.parts, self.beginning),
@@ -208,7 +210,6 @@ impl<'a> ShownWindows<'a> {
                 self.viewed,
             ),
         };
-        self.member_lists = member_lists(self.viewed, &before, &after, window.index == 0);
         self.items.take_touched();
         self.arrows.take_touched();
         let (changes, now) = (&self.changes, (self.viewed, &self.now));

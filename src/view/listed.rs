@@ -7,7 +7,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::choose::{Selection, is_infrastructure};
 use super::fold::namespaces::{clusters, headlines};
-use super::fold::rows::Drawn;
 use super::fold::{self, ItemKey, Keys};
 use super::{AlsoHere, ArrowId, Item, ItemId, ItemKind, Looks, Namespace, View, ViewOptions};
 use crate::base::name::lies_in;
@@ -74,7 +73,7 @@ impl Words {
         }
         let wiring = elements.wiring(|node, _| selection.nodes[node].is_none());
         let changing = changing_nodes(mission, drawn, &wiring);
-        words.nodes = nodes(options, (selection, drawn), &wiring, &changing);
+        words.nodes = nodes(elements, options, (selection, drawn), &wiring, &changing);
         let reported: BTreeSet<TopicId> = headlines(mission)
             .filter_map(|what| elements.ends(what).1)
             .collect();
@@ -124,6 +123,7 @@ impl Words {
 /// Whether each node is a word: without a connection and an event; in bundles without a line to another node, or, if leaves
 /// are words, with only one whose two ends never change. No node if fewer than half of the nodes have a line.
 fn nodes(
+    elements: &Elements,
     options: &ViewOptions,
     (selection, drawn): (&Selection, &ById<TopicId, bool>),
     wiring: &Wiring,
@@ -133,11 +133,12 @@ fn nodes(
     let partners = if options.is_bundled {
         partners(wiring, |topic| drawn[topic] && is_seen(&topic))
     } else {
-        let is_connected = |id: NodeId| {
-            let mut topics = wiring.published[id].iter().chain(&wiring.subscribed[id]);
-            topics.any(is_seen).then_some(id)
-        };
-        changing.ids().map(is_connected).collect()
+        let edges = elements.edges().filter(|(_, edge)| is_seen(&edge.topic));
+        let mut connected = ById::like(changing, None);
+        for (_, edge) in edges {
+            connected[edge.node] = Some(edge.node);
+        }
+        connected
     };
     let seen = selection.nodes.iter().filter(|reason| reason.is_none());
     if 2 * partners.iter().flatten().count() < seen.count() {
@@ -290,29 +291,23 @@ pub(crate) fn drawn_part(
     if items.iter().all(|drawn| *drawn) || nodes(false) > nodes(true) {
         return None;
     }
-    let mut part = Drawn {
+    let (mut words, mut shown) = (view.items.clone(), view.items_shown.clone());
+    words.retain(|at| !items[at]);
+    shown.retain(|at| !items[at]);
+    let mut part = View {
         items: view.items.clone(),
         arrows: view.arrows.clone(),
         items_shown: view.items_shown.clone(),
         arrows_shown: view.arrows_shown.clone(),
+        compares: view.compares,
+        ..View::default()
     };
-    let (mut words, mut shown) = (view.items.clone(), view.items_shown.clone());
-    words.retain(|at| !items[at]);
-    shown.retain(|at| !items[at]);
     part.keep_arrows(&arrows);
     part.keep_items(&items);
-    let namespaces = clusters(&mut part.items, options.group.namespaces, &BTreeSet::new());
+    part.namespaces = clusters(&mut part.items, options.group.namespaces, &BTreeSet::new());
+    part.also = also_here(words, shown, &part.namespaces);
     Some(DrawnPart {
-        view: View {
-            also: also_here(words, shown, &namespaces),
-            items: part.items,
-            arrows: part.arrows,
-            namespaces,
-            items_shown: part.items_shown,
-            arrows_shown: part.arrows_shown,
-            compares: view.compares,
-            ..View::default()
-        },
+        view: part,
         items,
         arrows,
     })

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::items::{Place, Viewed};
 use super::state::{LivingItems, Now};
-use super::{Arrow, ArrowId, ArrowKind, Counts, Headline, ItemId, ItemKind, Mark, Shown, TopicRow};
+use super::{Arrow, ArrowId, ArrowKind, Counts, Headline, ItemId, ItemKind, Mark, Shown};
 use crate::base::time::{Span, Stamp};
 use crate::graph::Element;
 use crate::mission::EventLog;
@@ -82,7 +82,11 @@ impl WindowMarks {
     }
 
     fn report(&mut self, viewed: &Viewed<'_>, event: &Event, headline: EventId, part: Part) {
-        let sign = EventSign::of(event, headline, part);
+        let sign = Report {
+            event,
+            headline,
+            part,
+        };
         self.add(viewed, event.what, &sign);
         match (&event.detail, event.what) {
             (Detail::Senders { from, to }, Element::Topic(topic)) => {
@@ -108,7 +112,7 @@ impl WindowMarks {
         }
     }
 
-    fn add(&mut self, viewed: &Viewed<'_>, what: Element, sign: &EventSign) {
+    fn add(&mut self, viewed: &Viewed<'_>, what: Element, sign: &Report<'_>) {
         if !viewed.pairs.is_empty() && what.is_edge() {
             self.add_carriers(viewed, what, sign);
         }
@@ -123,7 +127,7 @@ impl WindowMarks {
     }
 
     /// Marks the arrows that carry a topic or publication.
-    fn add_carriers(&mut self, viewed: &Viewed<'_>, what: Element, sign: &EventSign) {
+    fn add_carriers(&mut self, viewed: &Viewed<'_>, what: Element, sign: &Report<'_>) {
         for id in viewed.carriers(what) {
             sign.keep(&mut self.arrows, *id, Reach::of_arrow(viewed, *id));
         }
@@ -167,37 +171,32 @@ impl Reach {
     }
 }
 
-/// The effect of one event on the item or arrow that it is reported on.
-struct EventSign {
-    kind: Kind,
-    part: Part,
-    rates: Option<(f64, f64)>,
+/// An event, or the part of it that a window shows, on the item or arrow that it is reported on.
+struct Report<'a> {
+    event: &'a Event,
     headline: EventId,
+    part: Part,
 }
 
-impl EventSign {
-    fn of(event: &Event, headline: EventId, part: Part) -> Self {
-        Self {
-            kind: event.kind,
-            part,
-            rates: match event.detail {
-                Detail::Rates { from_hz, to_hz } => Some((from_hz, to_hz)),
-                _ => None,
-            },
-            headline,
+impl Report<'_> {
+    /// Messages per second before and after.
+    fn rates(&self) -> Option<(f64, f64)> {
+        match self.event.detail {
+            Detail::Rates { from_hz, to_hz } => Some((from_hz, to_hz)),
+            _ => None,
         }
     }
 
     /// The mark on an element that existed before and still does.
     fn mark(&self, reach: Reach) -> Option<Mark> {
-        let is_faster = self.rates.is_some_and(|(from, to)| to > from);
+        let is_faster = self.rates().is_some_and(|(from, to)| to > from);
         match (self.part, reach) {
             (_, Reach::Part | Reach::Inside) | (Part::Whole, _) => {}
             (Part::Leaves, Reach::Whole) => return Some(Mark::Removed),
             (Part::Away, Reach::Whole) => return Some(Mark::Away),
             (Part::Back, Reach::Whole) => return Some(Mark::Restarted),
         }
-        match (self.kind, reach) {
+        match (self.event.kind, reach) {
             (Kind::Rate, Reach::Whole | Reach::Part) if is_faster => Some(Mark::Faster),
             (Kind::Rate, Reach::Whole | Reach::Part) => Some(Mark::Slower),
             (_, Reach::Part | Reach::Inside) => Some(Mark::Inside),
@@ -214,15 +213,15 @@ impl EventSign {
     /// stays.
     fn keep<I: Ord>(&self, all: &mut BTreeMap<I, Changed>, id: I, reach: Reach) {
         let reported = all.entry(id).or_default();
-        reported.came |= matches!(self.kind, Kind::Started | Kind::Appeared);
-        reported.went |= matches!(self.kind, Kind::Stopped | Kind::Vanished);
+        reported.came |= matches!(self.event.kind, Kind::Started | Kind::Appeared);
+        reported.went |= matches!(self.event.kind, Kind::Stopped | Kind::Vanished);
         if let Err(place) = reported.events.binary_search(&self.headline) {
             reported.events.insert(place, self.headline);
         }
         let mark = self.mark(reach);
         if mark.map(weight) > reported.mark.map(weight) {
             reported.mark = mark;
-            reported.rates = self.rates.filter(|_| reach == Reach::Whole);
+            reported.rates = self.rates().filter(|_| reach == Reach::Whole);
         }
     }
 }
@@ -294,12 +293,10 @@ impl WindowChanges {
         if shown.mark.is_none_or(|mark| mark.class() != "changed") {
             return;
         }
-        let lives = |items: &LivingItems, row: &TopicRow| {
-            let all = items.topics.get(ArrowId(shown.id));
-            all.and_then(|all| all.get(row.topic as usize)) == Some(&true)
-        };
+        let id = ArrowId(shown.id);
         for row in &mut shown.topics {
-            let there = (lives(&self.before, row), lives(&self.after, row));
+            let has = |items: &LivingItems| items.has_topic(viewed, id, row.topic);
+            let there = (has(&self.before), has(&self.after));
             match there {
                 (false, true) => row.mark = Some(Mark::Added),
                 (true, false) => row.mark = Some(Mark::Removed),

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::{ArrowId, Counts, ItemId};
+use crate::base::cast;
 use crate::base::runs::Runs;
 use crate::evidence::Confidence;
 use crate::graph::State;
@@ -59,6 +60,15 @@ impl Mark {
             Self::Inside => "inside",
             Self::Away => "away",
             Self::Gone => "gone",
+        }
+    }
+
+    /// The class of its badge.
+    pub(crate) fn badge(self) -> &'static str {
+        match self {
+            // All of them are changes.
+            Self::Changed => "other",
+            mark => mark.word(),
         }
     }
 
@@ -118,6 +128,14 @@ pub struct Shown {
     pub count: Option<u64>,
     /// The lifecycle state of a node, if it has one.
     pub lifecycle: Option<Arc<str>>,
+}
+
+/// The thickest arrow's step: 1 kHz, faster than nearly all topics.
+pub(crate) const STEPS: u8 = 6;
+
+/// The width of a step's middle, in decades of 1 + Hz.
+pub(crate) fn decades(step: u8) -> f64 {
+    f64::from(step) / 2.0
 }
 
 /// The numbers of nodes and topics in a collapsed namespace that are in the graph of a window.
@@ -181,6 +199,13 @@ impl Shown {
         }
     }
 
+    /// The step of an arrow's thickness for its rate, 0..=[`STEPS`]: one per half a decade of 1 + Hz.
+    pub(crate) fn width_step(&self) -> u8 {
+        let hz = self.steady_hz.filter(|hz| hz.is_finite()).unwrap_or(0.0);
+        let decades = libm::log10(1.0 + hz.max(0.0));
+        cast::to_u8(libm::round(decades * 2.0).clamp(0.0, f64::from(STEPS)))
+    }
+
     /// Whether it ended in the window.
     pub(crate) fn is_ghost(&self) -> bool {
         matches!(self.mark, Some(Mark::Removed | Mark::Gone))
@@ -229,7 +254,7 @@ pub struct TopicRow {
 }
 
 /// The properties that distinguish unmarked topics of a bundle.
-pub(super) type RowKey = (u32, [bool; 2], bool, State, [Option<u64>; 2]);
+pub(crate) type RowKey = (u32, [bool; 2], bool, State, [Option<u64>; 2]);
 
 impl TopicRow {
     /// An unmarked topic that looks like this.
@@ -261,7 +286,7 @@ impl TopicRow {
         self.ways = [0, 1].map(|way| self.ways[way] || other.ways[way]);
     }
 
-    pub(super) fn key(&self) -> RowKey {
+    pub(crate) fn key(&self) -> RowKey {
         (
             self.topic,
             self.ways,

@@ -33,47 +33,43 @@ fn gather(slot: &mut Option<Shown>, id: u32, one: Shown) {
 pub(crate) struct LivingItems {
     pub(crate) items: ById<ItemId, bool>,
     pub(crate) arrows: ById<ArrowId, bool>,
-    /// Per arrow, the topics of a bundle that exist.
-    pub(crate) topics: ById<ArrowId, Vec<bool>>,
+    alive: Alive,
 }
 
 impl LivingItems {
-    pub(crate) fn of(viewed: &Viewed<'_>, alive: &Alive) -> Self {
+    pub(crate) fn of(viewed: &Viewed<'_>, alive: Alive) -> Self {
         let lives = |element: &Element| alive.is(*element);
-        let items = viewed
-            .items
-            .iter()
-            .map(|item| item.members.iter().any(lives));
+        let items = viewed.items.iter();
+        let items = items.map(|item| item.members.iter().any(lives));
         let items: ById<ItemId, bool> = items.collect();
-        let pair = |(p, s): &(EdgeId, EdgeId)| {
-            alive.is(Element::Publish(*p)) && alive.is(Element::Subscribe(*s))
-        };
-        let arrow = |(id, arrow): (ArrowId, &super::Arrow)| {
-            let members = || arrow.members.iter().any(lives);
-            let itself = viewed
-                .pairs
-                .get(id)
-                .map_or_else(members, |pairs| pairs.iter().any(pair));
+        let arrow = |(id, arrow): (ArrowId, &Arrow)| {
+            let itself = match viewed.pairs.get(id) {
+                Some(pairs) => pairs.iter().any(|pair| both_live(&alive, *pair)),
+                None => arrow.members.iter().any(lives),
+            };
             itself && items[arrow.from] && items[arrow.to]
         };
         let arrows = viewed.arrows.with_ids().map(arrow).collect();
-        let topics = |(id, arrow): (ArrowId, &super::Arrow)| {
-            let mut lives = vec![false; arrow.topics.len()];
-            let pairs = viewed.pairs.get(id).filter(|_| !lives.is_empty());
-            for both in pairs.into_iter().flatten().filter(|both| pair(both)) {
-                if let Some((topic, _)) = viewed.row(arrow, *both) {
-                    lives[topic as usize] = true;
-                }
-            }
-            lives
-        };
-        let topics = viewed.arrows.with_ids().map(topics).collect();
         Self {
             items,
             arrows,
-            topics,
+            alive,
         }
     }
+
+    /// Whether a topic of a bundle exists on this line.
+    pub(crate) fn has_topic(&self, viewed: &Viewed<'_>, id: ArrowId, topic: u32) -> bool {
+        let (arrow, pairs) = (&viewed.arrows[id], viewed.pairs.get(id));
+        let mut pairs = pairs.into_iter().flatten();
+        pairs.any(|pair| {
+            let row = viewed.row(arrow, *pair);
+            row.is_some_and(|row| row.0 == topic) && both_live(&self.alive, *pair)
+        })
+    }
+}
+
+fn both_live(alive: &Alive, (publish, subscribe): (EdgeId, EdgeId)) -> bool {
+    alive.is(Element::Publish(publish)) && alive.is(Element::Subscribe(subscribe))
 }
 
 /// Whether a node in this state is shown in a window.
@@ -385,10 +381,10 @@ fn starved(mission: &Mission) -> Vec<(Element, Span)> {
 }
 
 /// Beginnings and ends in continuous time.
-pub(crate) struct ItemTurns<'a> {
+pub(crate) struct Lifetimes<'a> {
     elements: &'a Elements,
     /// Per element, the times at which it began (true) and ended (false), sorted.
-    turns: PerElement<Vec<(Stamp, bool)>>,
+    bounds: PerElement<Vec<(Stamp, bool)>>,
     /// Per element, the times in which it was silent or away.
     pauses: PerElement<Vec<Span>>,
 }
@@ -396,11 +392,11 @@ pub(crate) struct ItemTurns<'a> {
 /// Whether each element exists.
 pub(crate) type Alive = PerElement<bool>;
 
-impl<'a> ItemTurns<'a> {
+impl<'a> Lifetimes<'a> {
     pub(crate) fn new(mission: &'a Mission) -> Self {
         let mut lives = Self {
             elements: &mission.elements,
-            turns: PerElement::new(&mission.elements, |_| Vec::new()),
+            bounds: PerElement::new(&mission.elements, |_| Vec::new()),
             pauses: PerElement::new(&mission.elements, |_| Vec::new()),
         };
         let events = &mission.log.events;
@@ -428,30 +424,30 @@ impl<'a> ItemTurns<'a> {
             // A run of a role begins where the last one ended, away until it is back.
             let is_new = begins && whole.kind == Kind::Restarted && !event.what.is_node();
             let end = whole.until.filter(|_| is_new);
-            let turn = (end.unwrap_or(whole.time), begins);
-            if let Some(turns) = lives.turns.of_mut(event.what) {
-                turns.push(turn);
+            let bound = (end.unwrap_or(whole.time), begins);
+            if let Some(bounds) = lives.bounds.of_mut(event.what) {
+                bounds.push(bound);
             }
         }
-        for turns in lives.turns.values_mut() {
-            turns.sort_by_key(|turn| turn.0);
+        for bounds in lives.bounds.values_mut() {
+            bounds.sort_by_key(|bound| bound.0);
         }
         lives
     }
 
     /// The elements that exist just before a moment.
     pub(crate) fn before(&self, at: Stamp) -> Alive {
-        self.alive(at, |turns| {
-            lives_at(turns, turns.partition_point(|t| t.0 < at))
+        self.alive(at, |bounds| {
+            lives_at(bounds, bounds.partition_point(|t| t.0 < at))
         })
     }
 
     /// The elements that exist at any time of a window.
     pub(crate) fn during(&self, span: Span) -> Alive {
-        self.alive(span.end, |turns| {
-            let first = turns.partition_point(|t| t.0 < span.start);
-            let inside = turns[first..].iter().take_while(|t| t.0 < span.end);
-            lives_at(turns, first) || inside.into_iter().any(|t| t.1)
+        self.alive(span.end, |bounds| {
+            let first = bounds.partition_point(|t| t.0 < span.start);
+            let inside = bounds[first..].iter().take_while(|t| t.0 < span.end);
+            lives_at(bounds, first) || inside.into_iter().any(|t| t.1)
         })
     }
 
@@ -488,8 +484,8 @@ impl<'a> ItemTurns<'a> {
     /// exists with its edges or, without edges, from its first message on.
     fn alive(&self, end: Stamp, own: impl Fn(&[(Stamp, bool)]) -> bool) -> Alive {
         let own = |what| {
-            let turns = self.turns.of(what).filter(|turns| !turns.is_empty())?;
-            Some(own(turns))
+            let bounds = self.bounds.of(what).filter(|bounds| !bounds.is_empty())?;
+            Some(own(bounds))
         };
         let mut alive = PerElement::new(self.elements, |what| {
             let is = |what| own(what) != Some(false);
@@ -549,9 +545,9 @@ fn kept<'a>(
 
 /// Whether an element exists after the first `done` of its beginnings and ends; before all of them, it exists
 /// unless the first is a beginning.
-fn lives_at(turns: &[(Stamp, bool)], done: usize) -> bool {
-    match done.checked_sub(1).and_then(|last| turns.get(last)) {
+fn lives_at(bounds: &[(Stamp, bool)], done: usize) -> bool {
+    match done.checked_sub(1).and_then(|last| bounds.get(last)) {
         Some((_, begins)) => *begins,
-        None => turns.first().is_none_or(|(_, begins)| !begins),
+        None => bounds.first().is_none_or(|(_, begins)| !begins),
     }
 }

@@ -199,7 +199,8 @@ fn written(runs: &[LookRun<'_>], windows: u32) -> Looks {
 /// the number of messages.
 const DIFFERENT: (f64, f64) = (0.25, 2.0);
 
-/// The fewest messages in a window that make a rate.
+/// The fewest messages in a window that make a rate: of four, one more or less is a quarter, the least difference that
+/// counts.
 const FEWEST: u64 = 5;
 
 /// Whether the rate of a window of so many seconds differs from `held` by more than chance.

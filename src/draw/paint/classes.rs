@@ -11,7 +11,6 @@ use crate::draw::picture::{Union, UnionElement};
 use crate::draw::scene::{Form, Group, Piece, Step};
 use crate::draw::style::Style;
 use crate::graph::Id as _;
-use crate::view::runs::word;
 use crate::view::{ArrowId, ItemId, Mark, View};
 
 /// A graph in SVG.
@@ -85,7 +84,7 @@ impl<'a> Classes<'a> {
         }
         Self::pieces(xml, &part.group, Some((part, look)));
         for mark in &part.marks {
-            let word = word(*mark);
+            let word = mark.badge();
             let Point { x, y } = part.badge;
             xml.open("use")
                 .attribute("href", format_args!("#{word}"))
@@ -175,7 +174,7 @@ impl<'a> Classes<'a> {
 /// sheet.
 pub(crate) fn badge_shapes(xml: &mut Xml, style: &Style, mark: Mark) {
     xml.open("g")
-        .attribute("id", word(mark))
+        .attribute("id", mark.badge())
         .attribute("class", "badge")
         .attribute("visibility", "hidden");
     let sign = crate::draw::picture::sign(style, mark);

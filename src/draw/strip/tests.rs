@@ -32,6 +32,7 @@ fn two_nodes() -> (Mission, View) {
         kind: ItemKind::Node,
         name: Arc::from(name),
         label: Arc::from(name),
+        others: Vec::new(),
         members: vec![Element::Node(NodeId(id))],
         is_replica: false,
         is_service: false,

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::element_runs::ElementRuns;
 use super::{HtmlPage, PageGraph};
 use crate::base::cast;
 use crate::base::digest;
@@ -22,7 +23,6 @@ use crate::mission::event_log::Kind;
 use crate::mission::events::sentence;
 use crate::mission::info::is_ros1;
 use crate::mission::{EventId, Mission};
-use crate::view::runs::ElementRuns;
 use crate::view::{Arrow, ArrowKind, Frame, Item};
 
 /// The number of bytes from which on data is deflated.

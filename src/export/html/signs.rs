@@ -9,7 +9,6 @@ use crate::draw::style::Style;
 use crate::draw::timeline::Timeline;
 use crate::draw::timeline::marks::Sign;
 use crate::graph::State;
-use crate::view::runs::word;
 use crate::view::{Mark, View};
 
 const MARKS: [Mark; 9] = [
@@ -90,7 +89,7 @@ fn picture(sign: &LegendSign) -> String {
         LegendSign::Group => group("topic", &format!("{BOX}{front}")),
         LegendSign::Namespace => group("node", &format!("{BOX}{front}")),
         LegendSign::Change(mark) => {
-            let word = word(*mark);
+            let word = mark.badge();
             let badge = format!("<use href=\"#{word}\" class=\"{word}\" x=\"31\" y=\"5\"/>");
             group(
                 &format!("topic {} {word}", mark.class()),

@@ -1,5 +1,7 @@
 //! Windows with more changes than a reader can follow: changes of one kind in one namespace become one
 //! coloured frame with their number, and a short phrase in the headline.
+//!
+//! Six nodes of `/nav` start in one window: a green frame around `/nav` says `+6 nodes`, and so does the headline.
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -11,7 +13,8 @@ use crate::mission::Mission;
 use crate::mission::event_log::{Event, EventId, Kind};
 use crate::view::{Frame, Mark, Phrase, SeenWindow, Shown, View};
 
-/// The most changes that have their own colour and their own words in the headline.
+/// The most changes that have their own colour and their own words in the headline: with more
+/// of them, colours no longer say where to look, and the headline would only count the rest as `+3`.
 const MOST: usize = 5;
 /// The words for the numbers of a crowd, in this order.
 const NOUNS: [&str; 4] = ["node", "topic", "edge", "rate"];

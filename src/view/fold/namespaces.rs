@@ -1,4 +1,7 @@
 //! Namespaces: those that are collapsed to one box, in which order, and those with a box around their members.
+//!
+//! `/nav` collapsed is one box for `/nav/planner`, `/nav/costmap` and the topic `/nav/plan` between them; `/nav/goal`, which
+//! comes from outside, stays beside it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -207,15 +210,15 @@ pub(crate) fn clusters(
     kept: &BTreeSet<&str>,
 ) -> Vec<Namespace> {
     let levels = depth.unwrap_or(DEEPEST).min(DEEPEST);
-    let homes: Vec<String> = homes(items, levels, kept);
+    let inner: Vec<String> = innermost_spaces(items, levels, kept);
     let mut spaces: BTreeSet<&str> = BTreeSet::new();
-    for mut space in homes.iter().map(String::as_str) {
+    for mut space in inner.iter().map(String::as_str) {
         while !space.is_empty() && spaces.insert(space) {
             space = parent(space);
         }
     }
     if depth.is_none() {
-        fold(&mut spaces, &homes, kept);
+        fold(&mut spaces, &inner, kept);
     }
     let places: BTreeMap<&str, usize> = spaces.iter().copied().zip(0..).collect();
     let innermost = |mut space| {
@@ -224,8 +227,8 @@ pub(crate) fn clusters(
         }
         places.get(space).copied()
     };
-    for (item, home) in items.iter_mut().zip(&homes) {
-        item.cluster = innermost(home.as_str());
+    for (item, space) in items.iter_mut().zip(&inner) {
+        item.cluster = innermost(space.as_str());
     }
     spaces
         .iter()
@@ -239,15 +242,18 @@ pub(crate) fn clusters(
 
 /// The namespace of each item; that of one of `kept`, and of a collapsed one beside members that were kept open, is
 /// itself.
-fn homes(items: &[Item], levels: usize, kept: &BTreeSet<&str>) -> Vec<String> {
-    let outer: Vec<String> = items.iter().map(|item| home(&item.name, levels)).collect();
+fn innermost_spaces(items: &[Item], levels: usize, kept: &BTreeSet<&str>) -> Vec<String> {
+    let outer: Vec<String> = items
+        .iter()
+        .map(|item| outer_space(&item.name, levels))
+        .collect();
     let around: BTreeSet<&str> = outer.iter().map(String::as_str).collect();
     let own = |(item, outer): (&Item, &String)| {
         let is_around = item.kind == ItemKind::Namespace && around.contains(&*item.name);
         if is_around {
             item.name.to_string()
         } else if kept.contains(&*item.name) {
-            home(&format!("{}/", item.name), levels)
+            outer_space(&format!("{}/", item.name), levels)
         } else {
             outer.clone()
         }
@@ -256,7 +262,7 @@ fn homes(items: &[Item], levels: usize, kept: &BTreeSet<&str>) -> Vec<String> {
 }
 
 /// The first parts of a name, at most `levels`, without its last; empty at the root.
-fn home(name: &str, levels: usize) -> String {
+fn outer_space(name: &str, levels: usize) -> String {
     let Some(rest) = name.strip_prefix('/') else {
         return String::new();
     };
@@ -276,10 +282,10 @@ fn parent(space: &str) -> &str {
 }
 
 /// Drops namespaces around a single item, which then belongs to the next outer one.
-fn fold(spaces: &mut BTreeSet<&str>, homes: &[String], always: &BTreeSet<&str>) {
+fn fold(spaces: &mut BTreeSet<&str>, inner: &[String], always: &BTreeSet<&str>) {
     let mut things: BTreeMap<&str, usize> = BTreeMap::new();
-    for home in homes {
-        *things.entry(home).or_default() += 1;
+    for space in inner {
+        *things.entry(space).or_default() += 1;
     }
     let mut kept = BTreeSet::new();
     // Backwards, a namespace comes after those inside it.

@@ -1,6 +1,8 @@
-//! Cards: a topic with only one connected box is a row of that box instead of a leaf beside it; a hub, a
-//! topic that half the system is connected to, is a row in every connected box instead of lines from
-//! everywhere.
+//! Topics as rows of boxes: one with only one connected box is a row of that box instead of a leaf beside it; a hub, a
+//! topic that half the system is connected to, is a row in every connected box instead of lines from everywhere.
+//!
+//! `/battery`, which only `/driver` publishes and nobody reads, is the row `→ /battery` of `/driver`; `/tf` is a row of each
+//! of the six nodes that use it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -9,7 +11,7 @@ use crate::base::name::{is_unnamed, namespace};
 use crate::graph::ById;
 use crate::mission::EventId;
 use crate::view::choose::is_infrastructure;
-use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemId, Looks, Shown, TopicRow};
+use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemId, Looks, Shown, TopicRow, View};
 
 /// A topic that is a row in a box: one without another known endpoint, or a hub.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,26 +29,18 @@ pub struct CardRow {
 }
 
 /// The least number of boxes that a hub is connected to, and of outermost namespaces (or the outside) that
-/// contain them. Fewer lines are easy to follow.
+/// contain them. Five lines to one topic are easy to follow, and those inside one namespace cross no other.
 const FEWEST_ENDS: usize = 6;
-const FEWEST_HOMES: usize = 2;
+const FEWEST_SPACES: usize = 2;
 
-/// The boxes and arrows of a view, and the looks of each.
-pub(crate) struct Drawn {
-    pub(crate) items: ById<ItemId, Item>,
-    pub(crate) arrows: ById<ArrowId, Arrow>,
-    pub(crate) items_shown: ById<ItemId, Looks>,
-    pub(crate) arrows_shown: ById<ArrowId, Looks>,
-}
-
-impl Drawn {
+impl View {
     /// Makes topics with one known endpoint rows of its box and, if `hides_infrastructure`, hubs rows of all
     /// connected boxes. Topics that exist without a connection in some window stay boxes. The rows are sorted
     /// by their boxes, publications before subscriptions.
-    pub(crate) fn fold_leaves(&mut self, hides_infrastructure: bool) -> Vec<CardRow> {
+    pub(crate) fn fold_leaves(&mut self, hides_infrastructure: bool) {
         let mut lines: ById<ItemId, Vec<ArrowId>> = ById::like(&self.items, Vec::new());
         for (at, arrow) in self.arrows.with_ids() {
-            if let Some((topic, _)) = self.topic_of(arrow) {
+            if let Some((topic, _)) = self.topic_end(arrow) {
                 lines[topic].push(at);
             }
         }
@@ -56,7 +50,7 @@ impl Drawn {
         for (topic, lines) in lines.with_ids().filter(|(_, lines)| !lines.is_empty()) {
             let mut owners: BTreeMap<ItemId, Vec<ArrowId>> = BTreeMap::new();
             for at in lines {
-                let end = self.topic_of(&self.arrows[*at]).map(|(_, owner)| owner);
+                let end = self.topic_end(&self.arrows[*at]).map(|(_, owner)| owner);
                 owners.entry(end.unwrap_or(topic)).or_default().push(*at);
             }
             let is_infrastructure = hides_infrastructure
@@ -96,21 +90,21 @@ impl Drawn {
                 .cmp(&key(b))
                 .then_with(|| a.item.name.cmp(&b.item.name))
         });
-        rows
+        self.rows = rows;
     }
 
     /// Whether a topic connected to these boxes is a hub: many, in several outermost namespaces.
     fn is_hub<'a>(&self, owners: impl Iterator<Item = &'a ItemId>) -> bool {
         let names = owners.map(|at| &*self.items[*at].name);
-        let homes: Vec<&str> = names
+        let spaces: Vec<&str> = names
             .map(|name| namespace(name).split('/').nth(1).unwrap_or_default())
             .collect();
-        let different: BTreeSet<&&str> = homes.iter().collect();
-        homes.len() >= FEWEST_ENDS && different.len() >= FEWEST_HOMES
+        let different: BTreeSet<&&str> = spaces.iter().collect();
+        spaces.len() >= FEWEST_ENDS && different.len() >= FEWEST_SPACES
     }
 
     /// The topic of an arrow with the box at its other end.
-    fn topic_of(&self, arrow: &Arrow) -> Option<(ItemId, ItemId)> {
+    fn topic_end(&self, arrow: &Arrow) -> Option<(ItemId, ItemId)> {
         let is_topic = |at: ItemId| self.items.get(at).is_some_and(|i| i.kind.word() == "topic");
         match (is_topic(arrow.from), is_topic(arrow.to)) {
             (true, false) => Some((arrow.from, arrow.to)),
@@ -129,15 +123,15 @@ impl Drawn {
             let look = looks.at(*k);
             look.is_some_and(|look| !is_infrastructure || look.mark.is_some())
         };
-        let all = self.looks(lines).chain([looks]);
+        let all = self.looks_of(lines).chain([looks]);
         let mut windows = all
             .flat_map(Looks::runs)
             .map(|run| run.0 as usize)
             .filter(needs_line);
-        windows.all(|k| reported(self.looks(lines).filter_map(|line| line.at(k))).is_some())
+        windows.all(|k| reported(self.looks_of(lines).filter_map(|line| line.at(k))).is_some())
     }
 
-    fn looks<'a>(&'a self, lines: &'a [ArrowId]) -> impl Iterator<Item = &'a Looks> + Clone {
+    fn looks_of<'a>(&'a self, lines: &'a [ArrowId]) -> impl Iterator<Item = &'a Looks> + Clone {
         lines.iter().filter_map(|at| self.arrows_shown.get(*at))
     }
 
@@ -153,7 +147,7 @@ impl Drawn {
         let own = self.items_shown.get(topic);
         let row = |k: usize| {
             let look = own?.at(k)?;
-            let line = reported(self.looks(lines).filter_map(|line| line.at(k)))?;
+            let line = reported(self.looks_of(lines).filter_map(|line| line.at(k)))?;
             // A connection that appeared or vanished is also the change of the row.
             let reported = if look.mark.is_some() { look } else { line };
             Some(Shown {
@@ -168,7 +162,7 @@ impl Drawn {
             ways: [lines.iter().any(sends), lines.iter().any(receives)],
             is_infrastructure,
             item: self.items[topic].clone(),
-            shown: Looks::made_of(self.looks(lines).chain(own), row),
+            shown: Looks::made_of(self.looks_of(lines).chain(own), row),
         }
     }
 

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use crate::draw::scene::Stroke;
 use crate::draw::style::{Body, Change, Color, Quiet, Style};
-use crate::view::runs::{STEPS, decades};
+use crate::view::{STEPS, decades};
 
 /// The rules of the graph in every window: [`base`], then [`states`].
 pub(crate) fn rules(style: &Style, words: &BTreeSet<&str>) -> String {

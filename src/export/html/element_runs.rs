@@ -6,11 +6,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Serialize, Serializer};
 
-use super::{Arrow, Looks, Mark, Shown, TopicRow, View};
 use crate::base::runs::Runs;
-use crate::base::{cast, words};
+use crate::base::words;
 use crate::evidence::Confidence;
 use crate::graph::State;
+use crate::view::{Arrow, Looks, Mark, Shown, TopicRow, View};
 
 /// The values of one item or arrow over the windows (indices into [`View::frames`]); before its first run a list has
 /// value 0.
@@ -105,7 +105,7 @@ struct LookClass {
     mark: Option<Mark>,
     /// Whether the receiver gets nothing.
     is_starved: bool,
-    /// The step of an arrow's thickness, 0..=[`STEPS`]; 0 for items.
+    /// The step of an arrow's thickness, 0..=[`STEPS`](crate::view::STEPS); 0 for items.
     step: u8,
 }
 
@@ -116,7 +116,7 @@ impl LookClass {
             confidence: shown.confidence,
             mark: shown.mark,
             is_starved: shown.is_starved,
-            step: arrow.map_or(0, |_| width_step(shown.steady_hz)),
+            step: arrow.map_or(0, |_| shown.width_step()),
         }
     }
 
@@ -127,7 +127,7 @@ impl LookClass {
         }
         if let Some(mark) = self.mark {
             words.push(mark.class().to_owned());
-            words.extend((mark.class() == "changed").then(|| word(mark).to_owned()));
+            words.extend((mark.class() == "changed").then(|| mark.badge().to_owned()));
         }
         if self.is_starved {
             words.push("starved".to_owned());
@@ -137,29 +137,6 @@ impl LookClass {
         }
         words.join(" ")
     }
-}
-
-/// The class name that identifies a mark: the class of its badge.
-pub(crate) fn word(mark: Mark) -> &'static str {
-    match mark {
-        // All of them are changes.
-        Mark::Changed => "other",
-        mark => mark.word(),
-    }
-}
-
-/// The thickest arrow's step.
-pub(crate) const STEPS: u8 = 6;
-
-/// The thickness of an arrow of this rate: a step per half a decade of 1 + Hz, 0..=[`STEPS`].
-fn width_step(hz: Option<f64>) -> u8 {
-    let decades = libm::log10(1.0 + hz.filter(|hz| hz.is_finite()).unwrap_or(0.0).max(0.0));
-    cast::to_u8(libm::round(decades * 2.0).clamp(0.0, f64::from(STEPS)))
-}
-
-/// The width of a step's middle, in decades of 1 + Hz.
-pub(crate) fn decades(step: u8) -> f64 {
-    f64::from(step) / 2.0
 }
 
 /// Distinct values in order of appearance.
