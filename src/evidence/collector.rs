@@ -1,26 +1,27 @@
 //! A collector of any number of bags: the times of all messages, and the observations in their contents.
+//!
+//! In: bags, through a [`BagSink`] each. Out: [`Recorded`], everything that they contain about the graph.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::Arc;
 
-use crate::bag::{Connection, Message, Want};
+use crate::bag::straight::ClockFall;
+use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
 use crate::base::error::{Error, Result};
-use crate::base::name::is_log;
+use crate::base::name::{in_space, is_log};
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::time::Stamp;
-use crate::evidence::SOURCES;
-use crate::evidence::inference::Stream;
+use crate::base::time::{Span, Stamp};
+use crate::evidence::clock::{Belief, ClockOffset, believed, offsets};
+use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::message::cursor::PayloadCursor;
 use crate::evidence::message::dynamic::MessageSchema;
-use crate::evidence::numbers::Numbers;
+use crate::evidence::numbers::{Numbers, is_numbered};
 use crate::evidence::observation::{Observations, SourceId};
-use crate::evidence::source::equal_stamps::FirstHeader;
-use crate::evidence::source::{self, Read, SourceContext, echo, equal_stamps, payload};
+use crate::evidence::source::equal_stamps::{self, FirstHeader};
+use crate::evidence::source::{self, Read, SourceContext, echo, payload};
 use crate::evidence::times::Stamps;
-
-pub use recorded::Recorded;
-pub use sink::BagSink;
+use crate::evidence::{SOURCES, publishers};
 
 /// Options for reading.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -355,9 +356,240 @@ pub(crate) fn spool_error(source: io::Error) -> Error {
     }
 }
 
-mod recorded;
-mod sink;
+/// A sink that feeds one bag into a [`Collector`].
+pub struct BagSink<'a> {
+    collector: &'a mut Collector,
+    progress: &'a mut dyn FnMut(u64, u64),
+    bag: usize,
+}
+
+impl BagSink<'_> {
+    fn stream(&self, connection: ConnectionId) -> Option<usize> {
+        let streams = self.collector.bags.get(self.bag)?;
+        streams.get(connection.0 as usize).copied()
+    }
+}
+
+impl Sink for BagSink<'_> {
+    fn connection(&mut self, connection: &Connection) -> Want {
+        let all = &mut *self.collector;
+        let topic = all
+            .facts
+            .name(&in_space(&all.space, connection.topic.as_str()));
+        let publisher = connection.publisher.as_ref();
+        let publisher = publisher.map(|p| in_space(&all.space, p.as_str()));
+        let stream = Stream {
+            bag: self.bag,
+            connection: connection.clone(),
+            topic,
+            publisher: publisher.map(|p| all.facts.name(&p)),
+            latched: is_held(connection),
+            trust: Reliability::Whole,
+            is_outside: false,
+            times: all.messages.series_of(self.bag),
+        };
+        let schema = all.schema(connection);
+        let (mut readers, foreign) = source::readers(&stream, &schema);
+        // It repeats the records of `/rosout` up to half a minute later, so that lists of topics would be out
+        // of order.
+        let own = all.bags.get(self.bag).into_iter().flatten();
+        let of = |name: &str| {
+            let streams = own.clone().copied();
+            let of = streams.filter(|at| all.streams[*at].connection.topic.as_str() == name);
+            of.collect::<Vec<usize>>()
+        };
+        match connection.topic.as_str() {
+            "/rosout_agg" if !of("/rosout").is_empty() => readers.clear(),
+            "/rosout" => of("/rosout_agg")
+                .into_iter()
+                .for_each(|at| all.layouts[at].readers.clear()),
+            _ => {}
+        }
+        if foreign {
+            all.notices
+                .add(undecodable(&stream, "its definition is not the known one"));
+        }
+        let header = equal_stamps::first_header(connection, &schema);
+        let stamped = all.options.infer_stamps && header.is_some();
+        let compared = all.options.payload_bytes > 0;
+        let want = all.options.want(!readers.is_empty(), stamped);
+        if want == Want::Payload || stamped {
+            all.read.insert(self.bag);
+        }
+        if is_numbered(connection, &schema) {
+            all.numbers.insert(all.streams.len(), Numbers::default());
+        }
+        if let Some(streams) = all.bags.get_mut(self.bag) {
+            streams.push(all.streams.len());
+        }
+        all.streams.push(stream);
+        all.layouts.push(StreamLayout {
+            readers,
+            is_numbered: schema.numbers_headers(&connection.encoding),
+            header,
+            schema: echo::schema(&connection.type_name, &schema).filter(|_| compared),
+        });
+        all.announced();
+        want
+    }
+
+    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
+        if let Some(stream) = self.stream(connection) {
+            let times = self.collector.streams[stream].times;
+            self.collector.messages.add(times, stamps, sizes);
+        }
+    }
+
+    fn message(&mut self, message: Message<'_>) {
+        if let Some(stream) = self.stream(message.connection) {
+            self.collector.read(stream, &message);
+        }
+    }
+
+    fn notice(&mut self, notice: Notice) {
+        self.collector.notices.add(notice);
+    }
+
+    fn progress(&mut self, done: u64, total: u64) {
+        (self.progress)(done, total);
+    }
+}
+
+/// Everything that the bags of a mission contain about its graph.
+#[derive(Debug, Default)]
+pub struct Recorded {
+    pub(crate) streams: Vec<Stream>,
+    pub(crate) messages: Stamps,
+    /// The numbers in the headers of streams, by index, as far as they were read.
+    pub(crate) numbers: BTreeMap<usize, Numbers>,
+    pub(crate) facts: Observations,
+    /// Problems that did not stop the reading.
+    pub notices: Notices,
+    /// The points at which a recorder's clock went back, sorted by time.
+    pub(crate) falls: Vec<ClockFall>,
+    /// Whether runs overlap in time, since they could not be shifted.
+    pub(crate) overlaps: bool,
+    /// The differences between the clocks of several recorders.
+    pub(crate) offsets: Vec<ClockOffset>,
+    /// The time from the first log time to the last plus 1 ns, without messages at impossible times; `None` if there is
+    /// no message.
+    pub span: Option<Span>,
+}
+
+impl Recorded {
+    /// Judges the times and the names of publishers, once everything is collected.
+    fn judge(&mut self) -> io::Result<()> {
+        let belief = believed(self.messages.calendars());
+        let jumps = belief.jumps.iter();
+        let jumps = jumps.map(|text| Notice::new(NoticeKind::Note, text));
+        self.notices.extend(jumps);
+        // What is set aside may show by how much clocks differ.
+        self.offsets = offsets(&self.streams, &self.facts)?;
+        self.set_aside(&belief)?;
+        source::rosout::interpret_lists(&mut self.facts);
+        let (streams, facts) = (&mut self.streams, &mut self.facts);
+        let judged = publishers::judge(streams, facts, &mut self.messages, &self.numbers)?;
+        self.notices.extend(judged);
+        if self.facts.dropped > 0 {
+            let text = "there are implausibly many or long names: an observation was left out";
+            let dropped = self.facts.dropped;
+            self.notices
+                .add(Notice::counted(NoticeKind::Damaged, dropped, text));
+        }
+        self.facts.seal();
+        self.span = self.measure();
+        Ok(())
+    }
+
+    /// Removes the messages at incredible times, and notes the offsets of other clocks so that their first messages are
+    /// together.
+    fn set_aside(&mut self, belief: &Belief) -> io::Result<()> {
+        let Some(span) = belief.span else {
+            return Ok(());
+        };
+        let before = self.firsts();
+        let zeros = self.messages.calendars().values().map(|bag| bag.zeros);
+        let zeros = if span.contains(Stamp(0)) {
+            0
+        } else {
+            zeros.sum()
+        };
+        let aside = self.clip(span)?;
+        let text = "message at time 0, before the clock was known, set aside";
+        self.notices
+            .add(Notice::counted(NoticeKind::Note, zeros, text));
+        let text = "message at an impossible time, set aside";
+        let far = aside.saturating_sub(zeros);
+        self.notices
+            .add(Notice::counted(NoticeKind::ImpossibleTime, far, text));
+        let kept = self.firsts().into_iter().min_by_key(|(_, first)| *first);
+        let offset = |bag: &usize| {
+            let ((other, start), first) = kept.zip(before.get(bag))?;
+            Some(ClockOffset {
+                bag: *bag,
+                other,
+                ahead: first.since(start),
+                messages: 0,
+            })
+        };
+        self.offsets.extend(belief.others.iter().filter_map(offset));
+        Ok(())
+    }
+
+    /// Removes the messages at other times than these, and everything that they state: they prove nothing. Returns their
+    /// number.
+    fn clip(&mut self, span: Span) -> io::Result<u64> {
+        let mut removed = 0;
+        for stream in &self.streams {
+            removed += self.messages.clip(stream.times, span)?;
+        }
+        self.facts.clip(span)?;
+        let has_messages = |at: &usize| self.messages.count(self.streams[*at].times) > 0;
+        self.facts.headers.retain(|at, _| has_messages(at));
+        self.numbers.values_mut().for_each(|own| own.clip(span));
+        Ok(removed)
+    }
+
+    /// Keeps a part of the recording, from its beginning on (`is_first`) or not.
+    ///
+    /// # Errors
+    /// If the temporary file of times cannot be read or written.
+    pub(crate) fn cut(&mut self, part: Span, is_first: bool) -> Result<()> {
+        self.clip(part).map_err(spool_error)?;
+        self.mark_outside(is_first);
+        self.span = self.measure();
+        Ok(())
+    }
+
+    /// The time of the first message of each bag with messages.
+    pub(crate) fn firsts(&self) -> BTreeMap<usize, Stamp> {
+        let mut firsts = BTreeMap::new();
+        for stream in &self.streams {
+            if let Some((first, _)) = self.messages.bounds(stream.times) {
+                let own = firsts.entry(stream.bag).or_insert(first);
+                *own = first.min(*own);
+            }
+        }
+        firsts
+    }
+
+    /// Marks the streams without a message in the part of the recording that was read. In a part from the
+    /// beginning on, they have no latched message yet.
+    fn mark_outside(&mut self, is_first: bool) {
+        for stream in &mut self.streams {
+            stream.is_outside = self.messages.bounds(stream.times).is_none();
+            stream.latched &= !(stream.is_outside && is_first);
+        }
+    }
+
+    /// The span of all messages.
+    fn measure(&self) -> Option<Span> {
+        let bounds = self.streams.iter();
+        let bounds = bounds.filter_map(|stream| self.messages.bounds(stream.times));
+        let (first, last) = bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+        Some(Span::new(first, last.plus(1)))
+    }
+}
+
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod tests_ros2;

@@ -14,6 +14,8 @@ use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::Stamp;
 #[cfg(feature = "source")]
 use crate::evidence::code::{Code, matching};
+use crate::evidence::given::substitution::ANONYMOUS;
+use crate::evidence::given::{NamedElement, Topology, TopologyEntry};
 use crate::evidence::inference::{
     Conclusions, ElementKey, Incident, IncidentKind, Inference, Stream, Validity, offers,
 };
@@ -21,8 +23,6 @@ use crate::evidence::observation::{Measurement, Name};
 use crate::evidence::source::contract::Owners;
 use crate::evidence::source_id;
 use crate::evidence::times::Stamps;
-use crate::evidence::topology::substitution::ANONYMOUS;
-use crate::evidence::topology::{NamedElement, Topology, TopologyEntry};
 use crate::evidence::{Confidence, EvidenceLine, SOURCES, unknown};
 
 /// Additions to the contents of the bags.

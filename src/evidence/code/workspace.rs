@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::declaration::{Class, Declaration, FileCode};
 use super::packages::{Package, Program, package_of};
-use crate::evidence::topology::launch::LaunchedNode;
+use crate::evidence::given::launch::LaunchedNode;
 
 /// The content of a workspace.
 #[derive(Debug, Default)]

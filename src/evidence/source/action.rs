@@ -4,7 +4,7 @@
 use super::SourceContext;
 use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::message::definition::MessageLayout;
+use crate::evidence::message::dynamic::MessageLayout;
 use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
 use std::collections::BTreeMap;
 

@@ -4,7 +4,7 @@
 use super::SourceContext;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::message::definition::MessageLayout;
+use crate::evidence::message::dynamic::MessageLayout;
 use crate::evidence::observation::{Confidence, Observation, SourceId};
 use std::collections::BTreeSet;
 

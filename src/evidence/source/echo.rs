@@ -13,7 +13,7 @@ use crate::evidence::message::cursor::PayloadCursor;
 use crate::evidence::message::dynamic::{MessageSchema, MessageValue};
 use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Confidence, Name, SourceId};
-use crate::evidence::texts::{LoggedText, ShownValue};
+use crate::evidence::observation::{LoggedText, ShownValue};
 
 /// The fewest different values that are significant; numbers are more often equal than words.
 const FEWEST: usize = 3;
