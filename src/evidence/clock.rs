@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use crate::base::budget;
+use crate::base::ids::ById;
 use crate::base::rhythm::GAP_NS;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::inference::Stream;
@@ -41,12 +42,12 @@ pub(crate) struct Belief {
 
 /// Assesses the times of a mission by the messages of each bag: first each bag's, since each recorder has its own clock,
 /// then those of all clocks.
-pub(crate) fn believed(bags: &BTreeMap<usize, Calendar>) -> Belief {
+pub(crate) fn believed(bags: &ById<usize, Calendar>) -> Belief {
     let mut belief = Belief::default();
-    let own = bags.iter().filter_map(|(bag, all)| {
+    let own = bags.with_ids().filter_map(|(bag, all)| {
         let (kept, jump) = of_bag(all)?;
         belief.jumps.extend(jump);
-        Some((*bag, kept))
+        Some((bag, kept))
     });
     let mut own: Vec<(usize, DayCluster)> = own.collect();
     own.sort_by_key(|(_, kept)| kept.first);
@@ -59,7 +60,7 @@ pub(crate) fn believed(bags: &BTreeMap<usize, Calendar>) -> Belief {
     let (kept, others): (Vec<_>, Vec<_>) = own.into_iter().partition(|(_, own)| is_kept(own));
     belief.others = others.into_iter().map(|(bag, _)| bag).collect();
     let start = bulk.first.saturating_mul(DAY);
-    let begins_at_0 = kept.iter().any(|(bag, _)| begins_at_0(&bags[bag]));
+    let begins_at_0 = kept.iter().any(|(bag, _)| begins_at_0(&bags[*bag]));
     let span = Span::new(
         Stamp(if start == 0 && !begins_at_0 { 1 } else { start }),
         Stamp(bulk.last.saturating_add(1).saturating_mul(DAY)),
@@ -68,7 +69,7 @@ pub(crate) fn believed(bags: &BTreeMap<usize, Calendar>) -> Belief {
     let is_whole = |bag: &Calendar| {
         bag.days.keys().all(is_inside) && (bag.zeros == 0 || span.contains(Stamp(0)))
     };
-    belief.span = (!bags.values().all(is_whole)).then_some(span);
+    belief.span = (!bags.iter().all(is_whole)).then_some(span);
     belief
 }
 
@@ -191,8 +192,8 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
     if bags.len() < 2 {
         return Ok(Vec::new());
     }
-    for (at, series) in &facts.payloads {
-        let stream = &streams[*at];
+    for (at, series) in facts.payloads.somes() {
+        let stream = &streams[at];
         if stream.latched {
             continue;
         }
@@ -252,7 +253,7 @@ mod tests {
         }
 
         fn all(bags: &[Calendar]) -> Belief {
-            believed(&bags.iter().cloned().enumerate().collect())
+            believed(&bags.iter().cloned().collect())
         }
 
         fn kept(days: &[(i64, u64)]) -> Option<(i64, i64)> {

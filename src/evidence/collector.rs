@@ -9,6 +9,7 @@ use std::sync::Arc;
 use crate::bag::straight::ClockFall;
 use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
 use crate::base::error::{Error, Result};
+use crate::base::ids::ById;
 use crate::base::name::{in_space, is_log};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::{Span, Stamp};
@@ -105,7 +106,7 @@ pub struct Collector {
     /// The schemas of all types and definitions.
     schemas: BTreeMap<[Arc<str>; 2], Arc<MessageSchema>>,
     /// The numbers in the headers of streams that have any, by index.
-    numbers: BTreeMap<usize, Numbers>,
+    numbers: ById<usize, Option<Numbers>>,
     /// The number of payload bytes compared so far.
     compared: u64,
     messages: Stamps,
@@ -222,7 +223,7 @@ impl Collector {
 
     /// Passes a message to the sources that know its layout.
     fn read(&mut self, place: usize, message: &Message<'_>) {
-        if let Some(numbers) = self.numbers.get_mut(&place) {
+        if let Some(Some(numbers)) = self.numbers.get_mut(place) {
             numbers.add(message.time, message.data);
         }
         let stream = &self.streams[place];
@@ -279,7 +280,7 @@ impl Collector {
             time: Some(message.time),
         };
         // The number in the header is set by the publisher, even in a copy.
-        let own = if self.numbers.contains_key(&place) {
+        let own = if self.numbers.some(place).is_some() {
             4
         } else {
             0
@@ -304,7 +305,9 @@ impl Collector {
             let (streams, read) = (&self.streams, &self.read);
             let facts = &mut self.facts;
             for kept in [&mut facts.payloads, &mut facts.ages] {
-                kept.retain(|at, _| read.contains(&streams[*at].bag));
+                for (series, stream) in kept.iter_mut().zip(streams) {
+                    *series = series.filter(|_| read.contains(&stream.bag));
+                }
             }
         }
     }
@@ -417,7 +420,7 @@ impl Sink for BagSink<'_> {
             all.read.insert(self.bag);
         }
         if is_numbered(connection, &schema) {
-            all.numbers.insert(all.streams.len(), Numbers::default());
+            *all.numbers.grown(all.streams.len()) = Some(Numbers::default());
         }
         if let Some(streams) = all.bags.get_mut(self.bag) {
             streams.push(all.streams.len());
@@ -461,7 +464,7 @@ pub struct Recorded {
     pub(crate) streams: Vec<Stream>,
     pub(crate) messages: Stamps,
     /// The numbers in the headers of streams, by index, as far as they were read.
-    pub(crate) numbers: BTreeMap<usize, Numbers>,
+    pub(crate) numbers: ById<usize, Option<Numbers>>,
     pub(crate) facts: Observations,
     /// Problems that did not stop the reading.
     pub notices: Notices,
@@ -508,7 +511,7 @@ impl Recorded {
             return Ok(());
         };
         let before = self.firsts();
-        let zeros = self.messages.calendars().values().map(|bag| bag.zeros);
+        let zeros = self.messages.calendars().iter().map(|bag| bag.zeros);
         let zeros = if span.contains(Stamp(0)) {
             0
         } else {
@@ -522,13 +525,14 @@ impl Recorded {
         let far = aside.saturating_sub(zeros);
         self.notices
             .add(Notice::counted(NoticeKind::ImpossibleTime, far, text));
-        let kept = self.firsts().into_iter().min_by_key(|(_, first)| *first);
+        let firsts = self.firsts();
+        let kept = firsts.somes().min_by_key(|(_, first)| **first);
         let offset = |bag: &usize| {
-            let ((other, start), first) = kept.zip(before.get(bag))?;
+            let ((other, start), first) = kept.zip(before.some(*bag))?;
             Some(ClockOffset {
                 bag: *bag,
                 other,
-                ahead: first.since(start),
+                ahead: first.since(*start),
                 messages: 0,
             })
         };
@@ -544,9 +548,13 @@ impl Recorded {
             removed += self.messages.clip(stream.times, span)?;
         }
         self.facts.clip(span)?;
-        let has_messages = |at: &usize| self.messages.count(self.streams[*at].times) > 0;
-        self.facts.headers.retain(|at, _| has_messages(at));
-        self.numbers.values_mut().for_each(|own| own.clip(span));
+        for (series, stream) in self.facts.headers.iter_mut().zip(&self.streams) {
+            *series = series.filter(|_| self.messages.count(stream.times) > 0);
+        }
+        self.numbers
+            .iter_mut()
+            .flatten()
+            .for_each(|own| own.clip(span));
         Ok(removed)
     }
 
@@ -562,12 +570,12 @@ impl Recorded {
     }
 
     /// The time of the first message of each bag with messages.
-    pub(crate) fn firsts(&self) -> BTreeMap<usize, Stamp> {
-        let mut firsts = BTreeMap::new();
+    pub(crate) fn firsts(&self) -> ById<usize, Option<Stamp>> {
+        let mut firsts = ById::default();
         for stream in &self.streams {
             if let Some((first, _)) = self.messages.bounds(stream.times) {
-                let own = firsts.entry(stream.bag).or_insert(first);
-                *own = first.min(*own);
+                let own: &mut Option<Stamp> = firsts.grown(stream.bag);
+                *own = Some(own.map_or(first, |own| first.min(own)));
             }
         }
         firsts

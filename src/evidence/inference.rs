@@ -5,6 +5,7 @@ use std::io;
 use std::sync::Arc;
 
 use crate::bag::{Connection, Encoding};
+use crate::base::ids::ById;
 use crate::base::name::{is_log, plain_type};
 use crate::base::rhythm::CLOSE_NS;
 use crate::base::time::{Span, Stamp};
@@ -170,22 +171,22 @@ pub(crate) struct Conclusions<'a> {
     /// The publishers that may have stopped, or not have started, in the part of the recording that is read.
     pub(crate) gone: BTreeSet<Option<Name>>,
     /// The streams of each topic.
-    recorded: BTreeMap<Name, Vec<usize>>,
+    recorded: ById<Name, Vec<usize>>,
     /// The number of publishers of each topic when its recording began.
-    offers: BTreeMap<Name, u32>,
+    offers: ById<Name, u32>,
     /// The error of reading times, if any.
     pub(crate) failed: Option<io::Error>,
-    publishers: BTreeMap<Name, BTreeSet<Name>>,
-    subscribers: BTreeMap<Name, BTreeSet<Name>>,
+    publishers: ById<Name, BTreeSet<Name>>,
+    subscribers: ById<Name, BTreeSet<Name>>,
     nodes: BTreeSet<Name>,
     closed: Option<Closed>,
 }
 
 impl<'a> Conclusions<'a> {
     pub(crate) fn new(streams: &'a [Stream], facts: Observations, mission: (Stamp, Stamp)) -> Self {
-        let mut recorded: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
+        let mut recorded: ById<Name, Vec<usize>> = ById::default();
         for (at, stream) in streams.iter().enumerate() {
-            recorded.entry(stream.topic).or_default().push(at);
+            recorded.grown(stream.topic).push(at);
         }
         Self {
             mission,
@@ -204,10 +205,10 @@ impl<'a> Conclusions<'a> {
         self.nodes.extend(node);
         match inference.what {
             ElementKey::Subscribe(topic, node) => {
-                self.subscribers.entry(topic).or_default().insert(node);
+                self.subscribers.grown(topic).insert(node);
             }
             ElementKey::Publish(node, topic) => {
-                self.publishers.entry(topic).or_default().insert(node);
+                self.publishers.grown(topic).insert(node);
             }
             ElementKey::Node(_) | ElementKey::Topic(_) => {}
         }
@@ -263,7 +264,7 @@ impl<'a> Conclusions<'a> {
         if self.knows(what) || self.denies(what) {
             return;
         }
-        for at in self.recorded.get(&topic).cloned().unwrap_or_default() {
+        for at in self.recorded.of(topic).to_vec() {
             if self.streams[at].publisher.is_none() {
                 let when = Validity::Messages(at);
                 let inference = Inference::new(source, what, Confidence::Inferred, when);
@@ -309,12 +310,12 @@ impl<'a> Conclusions<'a> {
 
     /// Whether a bag has a connection of this topic, even without messages.
     pub(crate) fn is_recorded(&self, topic: Name) -> bool {
-        self.recorded.contains_key(&topic)
+        !self.recorded.of(topic).is_empty()
     }
 
     /// The type of a recorded topic in the form of ROS 1, without `/msg`; empty if no bag states it.
     pub(crate) fn kind(&self, topic: Name) -> String {
-        let first = self.recorded.get(&topic).and_then(|all| all.first());
+        let first = self.recorded.of(topic).first();
         first.map_or_else(String::new, |at| {
             plain_type(&self.streams[*at].connection.type_name).into_owned()
         })
@@ -322,7 +323,7 @@ impl<'a> Conclusions<'a> {
 
     /// The number of publishers of a topic when its recording began; `None` if unknown.
     pub(crate) fn offers(&self, topic: Name) -> Option<u32> {
-        self.offers.get(&topic).copied()
+        self.offers.get(topic).copied().filter(|many| *many > 0)
     }
 
     /// The known node that a logger belongs to: the one of its name, or the nearest above it in the namespaces.
@@ -347,30 +348,30 @@ impl<'a> Conclusions<'a> {
 
     /// The nodes known so far to publish `topic`.
     pub(crate) fn publishers(&self, topic: Name) -> impl Iterator<Item = Name> + '_ {
-        self.publishers.get(&topic).into_iter().flatten().copied()
+        self.publishers.get(topic).into_iter().flatten().copied()
     }
 
-    /// The nodes known so far to subscribe to `topic`.
     /// The publisher of a topic, if it is known to be a single one.
     pub(crate) fn only_publisher(&self, topic: Name) -> Option<Name> {
         let mut all = self.publishers(topic);
         all.next().filter(|_| all.next().is_none())
     }
 
+    /// The nodes known so far to subscribe to `topic`.
     pub(crate) fn subscribers(&self, topic: Name) -> impl Iterator<Item = Name> + '_ {
-        self.subscribers.get(&topic).into_iter().flatten().copied()
+        self.subscribers.get(topic).into_iter().flatten().copied()
     }
 
     /// All subscriptions known so far, as topic and node.
     pub(crate) fn subscriptions(&self) -> impl Iterator<Item = (Name, Name)> + '_ {
-        let all = self.subscribers.iter();
-        all.flat_map(|(topic, nodes)| nodes.iter().map(move |node| (*topic, *node)))
+        let all = self.subscribers.with_ids();
+        all.flat_map(|(topic, nodes)| nodes.iter().map(move |node| (topic, *node)))
     }
 
     /// All publications known so far, as node and topic.
     pub(crate) fn publications(&self) -> impl Iterator<Item = (Name, Name)> + '_ {
-        let all = self.publishers.iter();
-        all.flat_map(|(topic, nodes)| nodes.iter().map(move |node| (*node, *topic)))
+        let all = self.publishers.with_ids();
+        all.flat_map(|(topic, nodes)| nodes.iter().map(move |node| (*node, topic)))
     }
 
     /// Every node known so far.
@@ -459,14 +460,12 @@ impl<'a> Conclusions<'a> {
     }
 }
 
-/// The largest number of publishers that offered each topic in one bag.
-pub(crate) fn offers(of_streams: &BTreeMap<usize, u32>, streams: &[Stream]) -> BTreeMap<Name, u32> {
-    let mut offers: BTreeMap<Name, u32> = BTreeMap::new();
-    for (at, count) in of_streams {
-        if let Some(stream) = streams.get(*at) {
-            let most = offers.entry(stream.topic).or_default();
-            *most = (*most).max(*count);
-        }
+/// The largest number of publishers that offered each topic in one bag; 0 if unknown.
+pub(crate) fn offers(of_streams: &ById<usize, u32>, streams: &[Stream]) -> ById<Name, u32> {
+    let mut offers: ById<Name, u32> = ById::default();
+    for (count, stream) in of_streams.iter().zip(streams) {
+        let most = offers.grown(stream.topic);
+        *most = (*most).max(*count);
     }
     offers
 }
@@ -646,19 +645,19 @@ fn absences(signs: &[Stamp], snapshots: &[Stamp]) -> Vec<Stamp> {
 pub(crate) struct Closed {
     /// By node: all topics that a rospy node names as its own, or all that a snapshot of the graph shows for
     /// a node.
-    all: BTreeMap<Name, BTreeSet<Name>>,
+    all: ById<Name, BTreeSet<Name>>,
     /// By node: all topics that a roscpp node publishes.
-    published: BTreeMap<Name, BTreeSet<Name>>,
+    published: ById<Name, BTreeSet<Name>>,
     /// Nodes whose lists were repeated long after the first: a list made at a node's start may lack later topics.
     settled: BTreeSet<Name>,
     /// Topics on which every message names its publisher, with all these publishers.
-    stated: BTreeMap<Name, BTreeSet<Name>>,
+    stated: ById<Name, BTreeSet<Name>>,
 }
 
 impl Closed {
     pub(crate) fn new(known: &Conclusions<'_>) -> Self {
         let mut closed = Self::default();
-        let mut context: BTreeMap<Name, Span> = BTreeMap::new();
+        let mut times: ById<Name, Option<Span>> = ById::default();
         for fact in &known.facts.list {
             let listed = fact.snapshot.is_some();
             let word = source_word(fact.source);
@@ -671,7 +670,7 @@ impl Closed {
                 known.facts.times.bounds(fact.times),
                 listed,
             ) {
-                let span = context.entry(node).or_insert(Span::new(first, last));
+                let span = times.grown(node).get_or_insert(Span::new(first, last));
                 span.start = span.start.min(first);
                 span.end = span.end.max(last);
             }
@@ -681,33 +680,35 @@ impl Closed {
                     Observation::Publish(node, topic) | Observation::Subscribe(node, topic),
                     "rosgraph",
                 ) => {
-                    closed.all.entry(node).or_default().insert(topic);
+                    closed.all.grown(node).insert(topic);
                 }
                 (Observation::Publish(node, topic), "rosout") if listed => {
-                    closed.published.entry(node).or_default().insert(topic);
+                    closed.published.grown(node).insert(topic);
                 }
                 _ => {}
             }
         }
-        context.retain(|_, span| span.nanos() >= SETTLED_NS);
-        closed.settled = context.into_keys().collect();
+        let settled = times.somes().filter(|(_, span)| span.nanos() >= SETTLED_NS);
+        closed.settled = settled.map(|(node, _)| node).collect();
         closed.fill(known);
         closed
     }
 
     fn fill(&mut self, known: &Conclusions<'_>) {
-        let mut unnamed = BTreeSet::new();
+        let mut unnamed = Vec::new();
         for stream in known.streams {
             match stream.publisher {
                 Some(node) if stream.trust == Reliability::Whole => {
-                    self.stated.entry(stream.topic).or_default().insert(node);
+                    self.stated.grown(stream.topic).insert(node);
                 }
                 _ => {
-                    unnamed.insert(stream.topic);
+                    unnamed.push(stream.topic);
                 }
             }
         }
-        self.stated.retain(|topic, _| !unnamed.contains(topic));
+        for topic in unnamed {
+            self.stated.grown(topic).clear();
+        }
     }
 
     /// Whether every message of a topic names its publisher, and this node is never named.
@@ -743,8 +744,9 @@ impl Closed {
 const SETTLED_NS: i64 = 5_000_000_000;
 
 /// Whether there is a list for `of` without `member`.
-fn lacks(lists: &BTreeMap<Name, BTreeSet<Name>>, of: Name, member: Name) -> bool {
-    lists.get(&of).is_some_and(|list| !list.contains(&member))
+fn lacks(lists: &ById<Name, BTreeSet<Name>>, of: Name, member: Name) -> bool {
+    let list = lists.get(of).filter(|list| !list.is_empty());
+    list.is_some_and(|list| !list.contains(&member))
 }
 
 // Statements about the graph other than about which elements exist.

@@ -9,6 +9,7 @@ use std::io;
 use std::sync::Arc;
 
 use crate::base::budget;
+use crate::base::ids::{ById, ids};
 use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
 use crate::evidence::source_word;
@@ -30,9 +31,11 @@ worded! {
     }
 }
 
-/// The number of a text in the mission: the name of a node or topic, a type, a state.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) struct Name(pub(crate) u32);
+ids! {
+    @pub(crate),
+    /// The number of a text in the mission: the name of a node or topic, a type, a state.
+    Name,
+}
 
 /// Declares the kinds of observations with the names in each.
 macro_rules! observations {
@@ -185,16 +188,16 @@ pub(crate) struct Observations {
     pub(crate) watched: Vec<String>,
     pub(crate) pieces: Vec<EvidenceLine>,
     /// The header stamps of streams, by the streams' indices; log times are stored in place of sizes.
-    pub(crate) headers: BTreeMap<usize, SeriesId>,
+    pub(crate) headers: ById<usize, Option<SeriesId>>,
     /// The ages of messages by their header stamps, by the streams' indices; stored in place of sizes
     /// ([`age_of`]).
-    pub(crate) ages: BTreeMap<usize, SeriesId>,
+    pub(crate) ages: ById<usize, Option<SeriesId>>,
     /// Statistics, in the order in which they were read.
     pub(crate) measured: Vec<Measurement>,
     /// The hashes of payloads, by the streams' indices; stored in place of sizes.
-    pub(crate) payloads: BTreeMap<usize, SeriesId>,
-    /// The number of publishers that offer each stream, by the streams' indices.
-    pub(crate) offers: BTreeMap<usize, u32>,
+    pub(crate) payloads: ById<usize, Option<SeriesId>>,
+    /// The number of publishers that offer each stream, by the streams' indices; 0 if unknown.
+    pub(crate) offers: ById<usize, u32>,
     /// Texts that nodes log, and texts in messages.
     pub(crate) logged: LoggedTexts,
     /// The namespaces of recordings; empty for one without.
@@ -202,7 +205,7 @@ pub(crate) struct Observations {
     /// Nodes with a log record from a Python file, until their lists are interpreted.
     pub(crate) rospy: BTreeSet<Name>,
     ids: HashMap<Arc<str>, Name>,
-    texts: Vec<Arc<str>>,
+    texts: ById<Name, Arc<str>>,
     /// The number of bytes of all texts.
     bytes: usize,
     places: HashMap<(Observation, SourceId, Option<Name>), usize>,
@@ -239,22 +242,17 @@ impl Observations {
         {
             return self.overflow();
         }
-        let name = Name(u32::try_from(self.texts.len()).unwrap_or(u32::MAX));
         self.bytes = bytes;
         let text: Arc<str> = text.into();
-        self.texts.push(Arc::clone(&text));
+        let name = self.texts.push(Arc::clone(&text));
         self.ids.insert(text, name);
         name
     }
 
     /// The name that replaces all texts beyond the limit; no observation about it is kept.
     fn overflow(&mut self) -> Name {
-        let name = Name(u32::try_from(self.texts.len()).unwrap_or(u32::MAX));
         let texts = &mut self.texts;
-        *self.overflow.get_or_insert_with(|| {
-            texts.push("".into());
-            name
-        })
+        *self.overflow.get_or_insert_with(|| texts.push("".into()))
     }
 
     /// The name of a known text.
@@ -264,9 +262,8 @@ impl Observations {
 
     /// The text of a name.
     pub(crate) fn text(&self, name: Name) -> Arc<str> {
-        self.texts
-            .get(name.0 as usize)
-            .map_or_else(|| "".into(), Arc::clone)
+        let text = self.texts.get(name);
+        text.map_or_else(|| "".into(), Arc::clone)
     }
 
     /// Adds an observation by `source`, at `time` if it has one; keeps its explanation if `why` requests its names.
@@ -340,7 +337,7 @@ impl Observations {
         let Some(times) = Arc::get_mut(&mut self.times) else {
             return Ok(());
         };
-        for series in self.payloads.values().chain(self.ages.values()) {
+        for series in self.payloads.iter().chain(&self.ages).flatten() {
             times.clip(*series, span)?;
         }
         let mut left = Vec::new();
@@ -399,14 +396,14 @@ impl Observations {
     }
 
     /// Numbers all names in the order of their texts; returns the new number of each old one.
-    pub(crate) fn renumber(&mut self) -> Vec<Name> {
-        let mut order: Vec<usize> = (0..self.texts.len()).collect();
+    pub(crate) fn renumber(&mut self) -> ById<Name, Name> {
+        let mut order: Vec<Name> = self.texts.ids().collect();
         order.sort_by(|a, b| self.texts[*a].cmp(&self.texts[*b]));
-        let mut new = vec![Name(0); order.len()];
-        for (rank, old) in (0..).zip(&order) {
-            new[*old] = Name(rank);
+        let mut new = ById::like(&self.texts, Name(0));
+        for (rank, old) in (0..).map(Name).zip(&order) {
+            new[*old] = rank;
         }
-        let to = |name: Name| new.get(name.0 as usize).copied().unwrap_or(name);
+        let to = |name: Name| new.get(name).copied().unwrap_or(name);
         self.texts = order
             .iter()
             .map(|old| Arc::clone(&self.texts[*old]))
@@ -427,7 +424,7 @@ impl Observations {
     }
 
     /// The texts of all names, by their numbers.
-    pub(crate) fn into_texts(self) -> Vec<Arc<str>> {
+    pub(crate) fn into_texts(self) -> ById<Name, Arc<str>> {
         self.texts
     }
 
@@ -448,12 +445,12 @@ pub(crate) fn age_of(kept: u32) -> i64 {
 /// Adds a time with its number to the series of a stream.
 fn note(
     times: &mut Arc<Stamps>,
-    series: &mut BTreeMap<usize, SeriesId>,
+    series: &mut ById<usize, Option<SeriesId>>,
     place: usize,
     (time, number): (Stamp, u32),
 ) {
     if let Some(times) = Arc::get_mut(times) {
-        let id = *series.entry(place).or_insert_with(|| times.series());
+        let id = *series.grown(place).get_or_insert_with(|| times.series());
         times.add(id, &[time], Some(&[number]));
     }
 }

@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
+use crate::base::ids::ById;
 use crate::base::name::{is_log, is_player};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::{BREAK_NS, FEWEST, RECENT, UNUSUAL, broken_after};
@@ -23,22 +24,22 @@ pub(crate) fn judge(
     streams: &mut Vec<Stream>,
     facts: &mut Observations,
     messages: &mut Stamps,
-    numbers: &BTreeMap<usize, Numbers>,
+    numbers: &ById<usize, Option<Numbers>>,
 ) -> io::Result<Vec<Notice>> {
     let named = NamedTopics::new(facts);
     let mut notices = Vec::new();
-    let mut bags: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    let mut bags: ById<usize, Vec<usize>> = ById::default();
     for (at, stream) in streams.iter().enumerate() {
-        bags.entry(stream.bag).or_default().push(at);
+        bags.grown(stream.bag).push(at);
     }
-    for of_bag in bags.values() {
+    for of_bag in &bags {
         if rewritten(streams, of_bag, &named) {
             notices.push(Notice::new(NoticeKind::Rewritten, REWRITTEN));
             for at in of_bag {
                 let stream = &streams[*at];
                 if let Some(node) = stream.publisher
                     && named.by_others(stream.topic, node)
-                    && !is_alone(stream, node, (&named, facts), (messages, numbers.get(at)))?
+                    && !is_alone(stream, node, (&named, facts), (messages, numbers.some(*at)))?
                 {
                     streams[*at].trust = Reliability::First;
                 }
@@ -69,25 +70,23 @@ const PLAYBACK: &str =
     "the bag was recorded during a playback, so the player publishes messages of other nodes";
 
 /// The topics that nodes name as their own in log records and similar messages.
+#[derive(Default)]
 struct NamedTopics {
-    topics: BTreeMap<Name, BTreeSet<Name>>,
+    topics: ById<Name, BTreeSet<Name>>,
     /// Names that log over the connection of another node.
-    guests: BTreeMap<Name, BTreeSet<Name>>,
+    guests: ById<Name, BTreeSet<Name>>,
 }
 
 impl NamedTopics {
     fn new(facts: &Observations) -> Self {
-        let mut all = Self {
-            topics: BTreeMap::new(),
-            guests: BTreeMap::new(),
-        };
+        let mut all = Self::default();
         for fact in &facts.list {
             match fact.observation {
                 Observation::Lists(node, topic) | Observation::Publish(node, topic) => {
-                    all.topics.entry(topic).or_default().insert(node);
+                    all.topics.grown(topic).insert(node);
                 }
                 Observation::Carries(host, guest) => {
-                    all.guests.entry(host).or_default().insert(guest);
+                    all.guests.grown(host).insert(guest);
                 }
                 _ => {}
             }
@@ -97,12 +96,11 @@ impl NamedTopics {
 
     /// The nodes that name a topic as their own.
     fn nodes(&self, topic: Name) -> impl Iterator<Item = Name> + '_ {
-        self.topics.get(&topic).into_iter().flatten().copied()
+        self.topics.get(topic).into_iter().flatten().copied()
     }
 
     fn by_others(&self, topic: Name, node: Name) -> bool {
-        let names = self.topics.get(&topic);
-        names.is_some_and(|names| names.iter().any(|name| *name != node))
+        self.nodes(topic).any(|name| name != node)
     }
 }
 
@@ -153,7 +151,8 @@ fn rewritten(streams: &[Stream], of_bag: &[usize], named: &NamedTopics) -> bool 
         .iter()
         .find(|at| is_log(streams[**at].connection.topic.as_str()));
     let host = log.and_then(|at| streams[*at].publisher);
-    host.is_some_and(|host| named.guests.contains_key(&host))
+    let guests = host.and_then(|host| named.guests.get(host));
+    guests.is_some_and(|guests| !guests.is_empty())
 }
 
 // Nodes that ended while one of their topics continued, in rewritten bags: another node took over the topic,
@@ -229,9 +228,9 @@ struct RewrittenBag<'a> {
     facts: &'a Observations,
     messages: &'a Stamps,
     /// The observations about each node.
-    stated: BTreeMap<Name, Vec<SeriesId>>,
+    stated: ById<Name, Vec<SeriesId>>,
     /// The streams that each node published, as far as known.
-    own: BTreeMap<Name, Vec<usize>>,
+    own: ById<Name, Vec<usize>>,
     /// The last message.
     end: Stamp,
     /// The times without any message, computed on demand.
@@ -245,16 +244,16 @@ impl<'a> RewrittenBag<'a> {
         facts: &'a Observations,
         messages: &'a Stamps,
     ) -> Self {
-        let mut stated: BTreeMap<Name, Vec<SeriesId>> = BTreeMap::new();
+        let mut stated: ById<Name, Vec<SeriesId>> = ById::default();
         for fact in &facts.list {
             if let Some(node) = shown(fact.observation) {
-                stated.entry(node).or_default().push(fact.times);
+                stated.grown(node).push(fact.times);
             }
         }
-        let mut own: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
+        let mut own: ById<Name, Vec<usize>> = ById::default();
         for at in of_bag {
             if let (Some(node), true) = (streams[*at].publisher, is_own(streams, *at)) {
-                own.entry(node).or_default().push(*at);
+                own.grown(node).push(*at);
             }
         }
         let bounds = of_bag
@@ -298,9 +297,9 @@ impl<'a> RewrittenBag<'a> {
     /// Whether the last sign of a node, other than the messages of this stream, is long before the end of the
     /// bag.
     fn may_have_ended(&self, node: Name, except: usize) -> bool {
-        let stated = self.stated.get(&node).into_iter().flatten();
+        let stated = self.stated.of(node).iter();
         let stated = stated.filter_map(|id| self.facts.times.bounds(*id));
-        let own = self.own.get(&node).into_iter().flatten();
+        let own = self.own.of(node).iter();
         let own = own.filter(|at| **at != except);
         let own = own.filter_map(|at| self.messages.bounds(self.streams[*at].times));
         let last = stated.chain(own).map(|(_, last)| last).max();
@@ -332,7 +331,7 @@ impl<'a> RewrittenBag<'a> {
     fn heir(&self, named: &NamedTopics, end: &NodeEnd) -> Option<Name> {
         let next = end.next?;
         let begins = |node: &Name| {
-            let signs = self.stated.get(node).into_iter().flatten();
+            let signs = self.stated.of(*node).iter();
             let bounds = signs.filter_map(|id| self.facts.times.bounds(*id));
             let first = bounds.map(|(first, _)| first).min();
             first.is_some_and(|first| first.since(next).abs() <= SOON_NS)
@@ -345,10 +344,10 @@ impl<'a> RewrittenBag<'a> {
     /// The times of all signs of a node, without the messages of one stream, sorted.
     fn signs(&self, node: Name, except: usize) -> io::Result<Vec<Stamp>> {
         let mut signs = Vec::new();
-        for id in self.stated.get(&node).into_iter().flatten() {
+        for id in self.stated.of(node) {
             signs.extend(self.facts.times.times(*id)?);
         }
-        let own = self.own.get(&node).into_iter().flatten();
+        let own = self.own.of(node).iter();
         for at in own.filter(|at| **at != except) {
             signs.extend(self.messages.times(self.streams[*at].times)?);
         }

@@ -10,6 +10,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::SpooledTempFile;
 
+use crate::base::ids::{ById, ids};
 use crate::base::time::{Span, Stamp};
 use crate::base::varint::{put, take_u64};
 
@@ -51,9 +52,11 @@ impl Calendar {
     }
 }
 
-/// The number of a sequence of times, counted from 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) struct SeriesId(pub u32);
+ids! {
+    @pub(crate),
+    /// The number of a sequence of times, counted from 0.
+    SeriesId,
+}
 
 /// An encoded run of stamps and its position.
 #[derive(Clone, Debug)]
@@ -92,24 +95,24 @@ impl OpenSeries {
 /// Any number of sequences of times, each message with its size if known.
 #[derive(Debug)]
 pub(crate) struct Stamps {
-    series: Vec<OpenSeries>,
+    series: ById<SeriesId, OpenSeries>,
     /// The temporary file; locked because reading moves its position.
     spool: Mutex<SpooledTempFile>,
     written: u64,
     open: usize,
     /// The messages of each bag by day.
-    calendars: BTreeMap<usize, Calendar>,
+    calendars: ById<usize, Calendar>,
     failed: Option<io::Error>,
 }
 
 impl Default for Stamps {
     fn default() -> Self {
         Self {
-            series: Vec::new(),
+            series: ById::default(),
             spool: Mutex::new(SpooledTempFile::new(IN_MEMORY)),
             written: 0,
             open: 0,
-            calendars: BTreeMap::new(),
+            calendars: ById::default(),
             failed: None,
         }
     }
@@ -126,14 +129,13 @@ impl Stamps {
         self.series.push(OpenSeries {
             bag,
             ..OpenSeries::default()
-        });
-        SeriesId(u32::try_from(self.series.len() - 1).unwrap_or(u32::MAX))
+        })
     }
 
     /// Adds times; `sizes`, if given, is as long as `stamps`. Times for a sequence that does not exist are
     /// dropped.
     pub(crate) fn add(&mut self, id: SeriesId, stamps: &[Stamp], sizes: Option<&[u32]>) {
-        let Some(series) = self.series.get_mut(id.0 as usize) else {
+        let Some(series) = self.series.get_mut(id) else {
             return;
         };
         let sizes = sizes.filter(|s| s.len() == stamps.len());
@@ -161,7 +163,7 @@ impl Stamps {
     fn close_all(&mut self) {
         let spool = self.spool.get_mut();
         let spool = spool.unwrap_or_else(PoisonError::into_inner);
-        for series in &mut self.series {
+        for series in self.series.iter_mut() {
             close(series, spool, &mut self.written, &mut self.calendars)
                 .unwrap_or_else(|e| self.failed = Some(e));
         }
@@ -225,7 +227,7 @@ impl Stamps {
     /// If times could not be written to the unnamed file.
     pub(crate) fn finish(&mut self) -> io::Result<()> {
         self.close_all();
-        for series in &mut self.series {
+        for series in self.series.iter_mut() {
             series.open = Vec::new();
             series.blocks.sort_by_key(|b| (b.first, b.last, b.at));
         }
@@ -266,7 +268,7 @@ impl Stamps {
     }
 
     /// The messages of each bag by day, as they were added and as far as they are in blocks.
-    pub(crate) fn calendars(&self) -> &BTreeMap<usize, Calendar> {
+    pub(crate) fn calendars(&self) -> &ById<usize, Calendar> {
         &self.calendars
     }
 
@@ -317,7 +319,7 @@ impl Stamps {
 
     /// Replaces the times of a sequence by these, sorted, which its calendar contains already.
     fn fill(&mut self, id: SeriesId, times: &[(Stamp, u32)], sized: bool) -> io::Result<()> {
-        let Some(series) = self.series.get_mut(id.0 as usize) else {
+        let Some(series) = self.series.get_mut(id) else {
             return Ok(());
         };
         *series = OpenSeries {
@@ -330,14 +332,14 @@ impl Stamps {
         let spool = spool.unwrap_or_else(PoisonError::into_inner);
         for block in times.chunks(BLOCK) {
             series.open = block.to_vec();
-            close(series, spool, &mut self.written, &mut BTreeMap::new())?;
+            close(series, spool, &mut self.written, &mut ById::default())?;
         }
         series.open = Vec::new();
         Ok(())
     }
 
     fn get(&self, id: SeriesId) -> Option<&OpenSeries> {
-        self.series.get(id.0 as usize)
+        self.series.get(id)
     }
 
     fn spool(&self) -> MutexGuard<'_, SpooledTempFile> {
@@ -363,7 +365,7 @@ fn close(
     series: &mut OpenSeries,
     spool: &mut SpooledTempFile,
     written: &mut u64,
-    calendars: &mut BTreeMap<usize, Calendar>,
+    calendars: &mut ById<usize, Calendar>,
 ) -> io::Result<()> {
     let mut open = std::mem::take(&mut series.open);
     if !open.is_sorted() {
@@ -373,7 +375,7 @@ fn close(
         return Ok(());
     };
     let (first, last) = (first.0, last.0);
-    calendars.entry(series.bag).or_default().add(&open);
+    calendars.grown(series.bag).add(&open);
     let bytes = encode(&open);
     series.hold(StampBlock {
         first,
@@ -585,7 +587,7 @@ mod tests {
         assert_eq!(all.times(rest).unwrap(), stamps([3, 5, DAY]));
         assert!(all.sized(id) && all.sized(rest));
         assert_eq!((all.count(id), all.count(rest)), (1, 3));
-        assert_eq!(all.calendars()[&0].days.values().sum::<u64>(), 4);
+        assert_eq!(all.calendars()[0].days.values().sum::<u64>(), 4);
     }
 
     #[test]
@@ -594,7 +596,7 @@ mod tests {
         let id = all.series_of(7);
         all.add(id, &stamps([5, 0, 3, 0]), Some(&[50, 10, 30, 7]));
         all.finish().unwrap();
-        let calendar = &all.calendars()[&7];
+        let calendar = &all.calendars()[7];
         assert_eq!((calendar.zeros, calendar.next), (2, Some(Stamp(3))));
         let span = Span::new(Stamp(1), Stamp(5));
         assert_eq!((all.clip(id, span).unwrap(), all.count(id)), (3, 1));

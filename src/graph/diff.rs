@@ -1,6 +1,6 @@
 //! The changes from one graph to the next: exact differences, and the reconfigurations that they amount to.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use crate::base::time::{Span, Stamp};
@@ -129,14 +129,13 @@ pub fn diff(before: &Graph, after: &Graph) -> Diff {
 
 /// The result of applying `diff` to `before`.
 pub fn apply(before: &Graph, diff: &Diff) -> Graph {
-    let gone: BTreeSet<Element> = diff.removed.iter().copied().collect();
+    let changed = diff.changed.iter().map(|(before, _)| before.what);
+    let gone: BTreeSet<Element> = diff.removed.iter().copied().chain(changed).collect();
     let kept = before.states.iter().filter(|s| !gone.contains(&s.what));
     let fresh = diff.changed.iter().map(|(_, after)| after);
-    let all = kept.chain(&diff.added).chain(fresh);
-    let all: BTreeMap<Element, &ElementState> = all.map(|s| (s.what, s)).collect();
-    Graph {
-        states: all.into_values().cloned().collect(),
-    }
+    let mut states: Vec<_> = kept.chain(&diff.added).chain(fresh).cloned().collect();
+    states.sort_by_key(|state| state.what);
+    Graph { states }
 }
 
 // Reconfigurations from differences: thresholds for rates, hand-overs, and hints from the evidence.
@@ -154,7 +153,7 @@ pub struct Changes<'a> {
     /// The interval in which each topic had publishers: from their first sign to the last.
     sent: ById<TopicId, (Option<Stamp>, Option<Stamp>)>,
     /// The nodes that last sent messages on each topic.
-    senders: BTreeMap<TopicId, BTreeSet<NodeId>>,
+    senders: ById<TopicId, BTreeSet<NodeId>>,
 }
 
 impl<'a> Changes<'a> {
@@ -165,7 +164,7 @@ impl<'a> Changes<'a> {
             threshold,
             before: None,
             sent: sent(elements),
-            senders: BTreeMap::new(),
+            senders: ById::like(&elements.topics, BTreeSet::new()),
         }
     }
 
@@ -286,25 +285,28 @@ impl<'a> Changes<'a> {
     /// Adds hand-overs: a topic is taken over if none of the nodes that publish it now were the last to
     /// publish it.
     fn handed_over(&mut self, before: &Graph, after: &Graph, changes: &mut Vec<Change>) {
-        for (topic, to) in self.sending(after) {
-            let from = self.senders.insert(topic, to.clone()).unwrap_or_default();
-            let other = !from.is_empty() && from.is_disjoint(&to);
+        for (topic, to) in self.sending(after).with_ids() {
+            if to.is_empty() {
+                continue;
+            }
+            let from = std::mem::replace(&mut self.senders[topic], to.clone());
+            let other = !from.is_empty() && from.is_disjoint(to);
             if other
                 && before.get(Element::Topic(topic)).is_some()
                 && !self.elements.topics[topic].is_shared()
             {
-                let (from, to) = (from.into_iter().collect(), to.into_iter().collect());
+                let (from, to) = (from.into_iter().collect(), to.iter().copied().collect());
                 changes.push(Change::HandedOver { topic, from, to });
             }
         }
     }
 
     /// The nodes that sent messages on each topic in a window.
-    fn sending(&self, graph: &Graph) -> BTreeMap<TopicId, BTreeSet<NodeId>> {
-        let mut sending: BTreeMap<TopicId, BTreeSet<NodeId>> = BTreeMap::new();
+    fn sending(&self, graph: &Graph) -> ById<TopicId, BTreeSet<NodeId>> {
+        let mut sending = ById::like(&self.elements.topics, BTreeSet::new());
         for (id, _) in graph.publishes().filter(|(_, s)| s.messages() > 0) {
             let edge = &self.elements.publishes[id];
-            sending.entry(edge.topic).or_default().insert(edge.node);
+            sending[edge.topic].insert(edge.node);
         }
         sending
     }

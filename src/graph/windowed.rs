@@ -49,7 +49,7 @@ pub(crate) fn graphs(
         findings,
         history,
         published: BTreeMap::new(),
-        sent: BTreeMap::new(),
+        sent: ById::default(),
     };
     all.topics(recorded).map_err(spool_error)?;
     all.nodes();
@@ -72,7 +72,7 @@ struct GraphAssembly<'a> {
     /// The messages of each known publisher on each topic, in windows with any.
     published: BTreeMap<(Name, Name), Column>,
     /// The messages of each known publisher per window.
-    sent: BTreeMap<Name, Vec<Sent>>,
+    sent: ById<Name, Vec<Sent>>,
 }
 
 /// The messages of a node in one window.
@@ -110,18 +110,21 @@ impl GraphAssembly<'_> {
     /// Counts messages, topic by topic.
     fn topics(&mut self, recorded: &Recorded) -> io::Result<()> {
         let history = self.history;
-        for (topic, streams) in &history.streams {
+        for (topic, streams) in history.streams.with_ids() {
+            if streams.is_empty() {
+                continue;
+            }
             let sums = rates(recorded, streams, &self.windows)?;
             for sum in &sums {
                 self.messages[sum.window] += sum.arrivals.count;
             }
-            self.count(recorded, *topic, streams, &sums)?;
-            if let Some(id) = history.topic_ids.get(topic) {
+            self.count(recorded, topic, streams, &sums)?;
+            if let Some(id) = history.topic_ids.some(topic) {
                 self.topic(*id, Some(&sums));
             }
         }
-        for (name, id) in &history.topic_ids {
-            if !history.streams.contains_key(name) {
+        for (name, id) in history.topic_ids.somes() {
+            if history.streams.of(name).is_empty() {
                 self.topic(*id, None);
             }
         }
@@ -136,25 +139,23 @@ impl GraphAssembly<'_> {
         streams: &[usize],
         sums: &[Sums],
     ) -> io::Result<()> {
-        let mut of: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
+        let mut of: ById<Name, Vec<usize>> = ById::default();
         for stream in streams {
             if let Some(node) = sender(&self.findings.streams[*stream]) {
-                of.entry(node).or_default().push(*stream);
+                of.grown(node).push(*stream);
             }
         }
-        for (node, own) in of {
+        for (node, own) in of.with_ids().filter(|(_, own)| !own.is_empty()) {
             let read;
             let own = if own.len() == streams.len() {
                 sums
             } else {
-                read = rates(recorded, &own, &self.windows)?;
+                read = rates(recorded, own, &self.windows)?;
                 &read
             };
             let many = self.windows.len();
-            let sent = self
-                .sent
-                .entry(node)
-                .or_insert_with(|| vec![Sent::default(); many]);
+            let sent = self.sent.grown(node);
+            sent.resize(many, Sent::default());
             let mut column = ColumnWriter::default();
             for sum in own {
                 let window = self.windows.0[sum.window];
@@ -210,18 +211,18 @@ impl GraphAssembly<'_> {
     }
 
     fn nodes(&mut self) {
-        for (name, id) in &self.history.node_ids {
+        for (name, id) in self.history.node_ids.somes() {
             let what = Element::Node(*id);
             let Some(record) = self.history.records.of(what) else {
                 continue;
             };
-            let sent = self.sent.get(name);
+            let sent = self.sent.get(name).filter(|sent| !sent.is_empty());
             let mut rows = ColumnWriter::default();
             for (at, window) in self.windows.0.iter().enumerate() {
                 if !Self::sees(record, *window) {
                     continue;
                 }
-                let lifecycle = self.findings.values.lifecycle(*name, *window);
+                let lifecycle = self.findings.values.lifecycle(name, *window);
                 let row = Row {
                     // A node's count only stands for its rate.
                     count: sent
@@ -247,8 +248,10 @@ impl GraphAssembly<'_> {
 
     fn publishes(&mut self) {
         // In the order of their ids.
-        let nodes: ById<NodeId, Name> = self.history.node_ids.keys().copied().collect();
-        let topics: ById<TopicId, Name> = self.history.topic_ids.keys().copied().collect();
+        let nodes = self.history.node_ids.somes().map(|(name, _)| name);
+        let nodes: ById<NodeId, Name> = nodes.collect();
+        let topics = self.history.topic_ids.somes().map(|(name, _)| name);
+        let topics: ById<TopicId, Name> = topics.collect();
         for (id, edge) in self.history.elements.publishes.with_ids() {
             let what = Element::Publish(id);
             let Some(record) = self.history.records.of(what) else {
@@ -374,7 +377,10 @@ impl WindowMeasures {
         windows: &SortedWindows<'_>,
     ) -> io::Result<Self> {
         let mut all = Self::default();
-        let only = only_topics(findings, history);
+        // The topics of each node besides housekeeping, for measurements that name none.
+        let elements = &history.elements;
+        let is_quiet = |topic: TopicId| is_quiet(elements.topics[topic].name.as_str());
+        let subscribed = elements.wiring(|_, topic| !is_quiet(topic)).subscribed;
         // The ends of rolling reports, by what they are about.
         let mut ends: BTreeMap<_, Stamp> = BTreeMap::new();
         for measured in &findings.measured {
@@ -384,18 +390,18 @@ impl WindowMeasures {
                 let before = ends.insert(about, span.end);
                 span.start = span.start.max(before.unwrap_or(span.start)).min(span.end);
             }
-            all.report(measured, span, &only, history, windows);
+            all.report(measured, span, &subscribed, history, windows);
         }
-        for (topic, streams) in &history.streams {
-            let Some(id) = history.topic_ids.get(topic) else {
+        for (topic, streams) in history.streams.with_ids() {
+            let Some(id) = history.topic_ids.some(topic) else {
                 continue;
             };
             for stream in streams {
-                let Some(ages) = recorded.facts.ages.get(stream) else {
+                let Some(ages) = recorded.facts.ages.some(*stream) else {
                     continue;
                 };
                 let node = sender(&findings.streams[*stream]);
-                let node = node.and_then(|node| history.node_ids.get(&node));
+                let node = node.and_then(|node| history.node_ids.some(node));
                 let edge = node.and_then(|node| history.elements.publication(*node, *id));
                 recorded.facts.times.merge(&[*ages], |timed| {
                     let age = age_of(timed.size) as f64;
@@ -417,17 +423,17 @@ impl WindowMeasures {
         &mut self,
         of: &Measurement,
         new: Span,
-        only: &BTreeMap<NodeId, Option<TopicId>>,
+        subscribed: &ById<NodeId, Vec<TopicId>>,
         history: &History,
         windows: &SortedWindows<'_>,
     ) {
-        let node = |name| history.node_ids.get(&name).copied();
+        let node = |name| history.node_ids.some(name).copied();
         let topic = match of.topic {
-            Some(topic) => history.topic_ids.get(&topic).copied(),
-            None => of
-                .subscriber
-                .and_then(node)
-                .and_then(|node| *only.get(&node)?),
+            Some(topic) => history.topic_ids.some(topic).copied(),
+            None => match of.subscriber.and_then(node).map(|node| subscribed.of(node)) {
+                Some([only]) => Some(*only),
+                _ => None,
+            },
         };
         let Some(topic) = topic else {
             return;
@@ -468,25 +474,6 @@ impl WindowMeasures {
         let sum = self.0.get(&(what, at)).copied().unwrap_or_default();
         (sum.delivered.map(whole_number), sum.bytes.map(whole_number))
     }
-}
-
-/// The topic of each node that subscribes to a single one besides housekeeping, if a measurement needs it.
-fn only_topics(findings: &Findings, history: &History) -> BTreeMap<NodeId, Option<TopicId>> {
-    let mut only = BTreeMap::new();
-    if findings.measured.iter().all(|one| one.topic.is_some()) {
-        return only;
-    }
-    let elements = &history.elements;
-    let is_quiet = |topic: TopicId| is_quiet(elements.topics[topic].name.as_str());
-    for edge in elements
-        .subscribes
-        .iter()
-        .filter(|edge| !is_quiet(edge.topic))
-    {
-        let topic = only.entry(edge.node).or_insert(Some(edge.topic));
-        *topic = topic.filter(|topic| *topic == edge.topic);
-    }
-    only
 }
 
 impl MeasureSum {

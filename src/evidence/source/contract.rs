@@ -6,12 +6,12 @@
 //! files is another program. A row without a node's name applies to every node that logs from one of its
 //! files.
 
-use std::collections::{BTreeMap, BTreeSet};
-
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::SourceContext;
 use crate::base::csv;
+use crate::base::ids::ById;
 use crate::base::name::{last_part, namespace};
 use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::message::log::LogRecord;
@@ -106,11 +106,12 @@ fn contract(line: usize, row: &[String]) -> Option<Contract> {
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let files = files(known);
     let nodes = known.nodes().clone();
-    let mut publishers: BTreeMap<Name, Vec<(Name, Contract)>> = BTreeMap::new();
+    let mut publishers: ById<Name, Vec<(Name, Contract)>> = ById::default();
     for contract in Owners::new(known).0 {
         for node in nodes.iter().copied() {
             let name = known.text(node);
-            if !is_meant(&contract, &name, files.get(&node)) {
+            let own = files.get(node).filter(|own| !own.is_empty());
+            if !is_meant(&contract, &name, own) {
                 continue;
             }
             let topic = known.facts.known(&resolved(&contract.topic, &name));
@@ -118,10 +119,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
                 continue;
             };
             if contract.publishes {
-                publishers
-                    .entry(topic)
-                    .or_default()
-                    .push((node, contract.clone()));
+                publishers.grown(topic).push((node, contract.clone()));
             } else if !known.knows(ElementKey::Publish(node, topic)) {
                 let what = ElementKey::Subscribe(topic, node);
                 known.infer(source, what, ElementKey::Node(node), |known| {
@@ -130,8 +128,8 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             }
         }
     }
-    for (topic, nodes) in publishers {
-        publish(source, known, topic, &nodes);
+    for (topic, nodes) in publishers.with_ids() {
+        publish(source, known, topic, nodes);
     }
 }
 
@@ -218,13 +216,13 @@ impl Owners {
 }
 
 /// The files that each node logs from.
-fn files(known: &Conclusions<'_>) -> BTreeMap<Name, BTreeSet<Arc<str>>> {
-    let mut files: BTreeMap<Name, BTreeSet<Arc<str>>> = BTreeMap::new();
+fn files(known: &Conclusions<'_>) -> ById<Name, BTreeSet<Arc<str>>> {
+    let mut files: ById<Name, BTreeSet<Arc<str>>> = ById::default();
     for fact in &known.facts.list {
         if let Observation::LogsFrom(logger, file) = fact.observation
             && let Some(node) = known.owner(&known.text(logger))
         {
-            files.entry(node).or_default().insert(known.text(file));
+            files.grown(node).insert(known.text(file));
         }
     }
     files

@@ -6,6 +6,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::SourceContext;
+use crate::base::ids::ById;
 use crate::base::name::{in_space, plain_type};
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
@@ -125,10 +126,10 @@ type LogForm = (Name, String, String, Name);
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let (said, shown) = known.facts.logged.sorted();
     let echoes = echoes(known, &said, &shown);
-    let mut by_node: BTreeMap<Name, Vec<&str>> = BTreeMap::new();
+    let mut by_node: ById<Name, Vec<&str>> = ById::default();
     for text in &said {
         if let Some(node) = known.owner(&text.logger) {
-            by_node.entry(node).or_default().push(&text.text);
+            by_node.grown(node).push(&text.text);
         }
     }
     let enough = echoes
@@ -137,8 +138,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let strong: Vec<_> = enough
         .take(MOST_FORMS)
         .filter(|((node, before, after, _), echo)| {
-            let texts = by_node.get(node).map_or(&[][..], |texts| texts);
-            is_strong(echo, before, after, texts)
+            is_strong(echo, before, after, by_node.of(*node))
         })
         .collect();
     for ((node, before, after, topic), echo) in &strong {

@@ -302,8 +302,8 @@ fn without_siblings(
 
 /// Pools the streams and compares their stamps.
 fn flows(known: &mut Conclusions<'_>) -> Flows {
-    let streams: Vec<usize> = known.facts.headers.keys().copied().collect();
-    let series: Vec<_> = known.facts.headers.values().copied().collect();
+    let (streams, series): (Vec<usize>, Vec<_>) = known.facts.headers.somes().unzip();
+    let series: Vec<_> = series.into_iter().copied().collect();
     let mut pooled: BTreeMap<(String, String), StampFlow> = BTreeMap::new();
     let mut keys = Vec::new();
     for (at, id) in streams.iter().zip(&series) {

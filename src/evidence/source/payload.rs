@@ -11,6 +11,7 @@ use std::hash::BuildHasher as _;
 use foldhash::quality::FixedState;
 use foldhash::{HashMap, HashSet};
 
+use crate::base::ids::ById;
 use crate::base::name::LOGS;
 use crate::base::rhythm::FEWEST_OF_SENDER;
 use crate::base::time::Stamp;
@@ -73,35 +74,35 @@ struct Run {
 struct Matches {
     pairs: BTreeMap<(usize, usize), PayloadPair>,
     /// By flow: the number of its different messages that were seen before in exactly these other flows.
-    origins: BTreeMap<usize, BTreeMap<Vec<usize>, u64>>,
-    distinct: BTreeMap<usize, u64>,
+    origins: ById<usize, BTreeMap<Vec<usize>, u64>>,
+    distinct: ById<usize, u64>,
     /// By flow: the number of its messages that another one had just after it, as the recorder may receive a
     /// copy first.
-    later: BTreeMap<usize, BTreeMap<usize, u64>>,
+    later: ById<usize, BTreeMap<usize, u64>>,
     /// By flow, in order.
-    runs: BTreeMap<usize, Vec<Run>>,
+    runs: ById<usize, Vec<Run>>,
 }
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let (flows, matches) = matches(known);
-    for (output, total) in &matches.distinct {
-        let (basis, sender) = flows[*output];
+    for (output, total) in matches.distinct.with_ids().filter(|(_, total)| **total > 0) {
+        let (basis, sender) = flows[output];
         let Some(node) = sender.or_else(|| known.only_publisher(basis)) else {
             continue;
         };
-        let inputs = inputs(known, &flows, &matches, *output, node);
-        let copied = copied(&matches, *output, &inputs);
+        let inputs = inputs(known, &flows, &matches, output, node);
+        let copied = copied(&matches, output, &inputs);
         if copied < FEWEST || copied * 100 < total * SHARE {
             continue;
         }
         known.copies.insert((node, basis));
-        let inputs = nearest(&matches, *output, &inputs);
-        turns(source, known, &flows, &matches, (*output, &inputs));
+        let inputs = nearest(&matches, output, &inputs);
+        turns(source, known, &flows, &matches, (output, &inputs));
         for input in inputs {
             let topic = flows[input].0;
             let what = ElementKey::Subscribe(topic, node);
             known.infer(source, what, ElementKey::Publish(node, basis), |known| {
-                let count = matches.pairs[&(input, *output)].before;
+                let count = matches.pairs[&(input, output)].before;
                 let [from, to] = [topic, basis].map(|n| known.text(n));
                 format!(
                     "{count} of {total} different messages of {to} are byte by byte those of {from} just before"
@@ -119,7 +120,7 @@ fn turns(
     matches: &Matches,
     (output, inputs): (usize, &[usize]),
 ) {
-    let runs = matches.runs.get(&output).into_iter().flatten();
+    let runs = matches.runs.of(output).iter();
     let runs: Vec<&Run> = runs
         .filter(|run| run.count >= FEWEST_OF_SENDER && inputs.contains(&run.input))
         .collect();
@@ -139,12 +140,11 @@ fn turns(
 /// Processes all messages in order of time.
 fn matches(known: &mut Conclusions<'_>) -> (Vec<PayloadFlow>, Matches) {
     let mut topics: BTreeMap<String, BTreeSet<Name>> = BTreeMap::new();
-    for at in known.facts.payloads.keys() {
-        let topic = known.streams[*at].topic;
+    for (at, _) in known.facts.payloads.somes() {
+        let topic = known.streams[at].topic;
         topics.entry(known.kind(topic)).or_default().insert(topic);
     }
-    let kept = known.facts.payloads.clone();
-    let kept = kept.into_iter().filter(|(at, _)| {
+    let kept = known.facts.payloads.somes().filter(|(at, _)| {
         let stream = &known.streams[*at];
         // The only topic of its type is not a copy of another, and log records are forwarded by a known node.
         let alike = topics.get(&known.kind(stream.topic));
@@ -204,13 +204,13 @@ impl PayloadWalk {
         if !self.seen.insert((flow, hash)) {
             return;
         }
-        *self.found.distinct.entry(flow).or_default() += 1;
+        *self.found.distinct.grown(flow) += 1;
         let owners = self.recent.entry(hash).or_default();
         if owners.len() >= MOST_AT_ONCE {
             return;
         }
         for (_, other) in owners.iter().filter(|(t, f)| *t < time && *f != flow) {
-            let later = self.found.later.entry(*other).or_default();
+            let later = self.found.later.grown(*other);
             *later.entry(flow).or_default() += 1;
         }
         let mut origins = Vec::new();
@@ -221,7 +221,7 @@ impl PayloadWalk {
             origins.push(*input);
         }
         if let [input] = origins[..] {
-            let runs = self.found.runs.entry(flow).or_default();
+            let runs = self.found.runs.grown(flow);
             let is_more = runs.len() < MOST_RUNS;
             match runs.last_mut() {
                 Some(run) if run.input == input => run.count += 1,
@@ -235,13 +235,8 @@ impl PayloadWalk {
         }
         if !origins.is_empty() {
             origins.sort_unstable();
-            *self
-                .found
-                .origins
-                .entry(flow)
-                .or_default()
-                .entry(origins)
-                .or_default() += 1;
+            let of = self.found.origins.grown(flow);
+            *of.entry(origins).or_default() += 1;
         }
         owners.push((time, flow));
         self.queue.push_back((time, hash));
@@ -259,7 +254,7 @@ fn inputs(
 ) -> Vec<usize> {
     let before = |a, b| matches.pairs.get(&(a, b)).map_or(0, |pair| pair.before);
     let (to, _) = flows[output];
-    let own = matches.origins.get(&output).into_iter().flatten();
+    let own = matches.origins.get(output).into_iter().flatten();
     let from: BTreeSet<usize> = own.flat_map(|(from, _)| from).copied().collect();
     let mut inputs = Vec::new();
     for input in from {
@@ -281,14 +276,14 @@ fn inputs(
 
 /// The number of different messages of an output that one of these inputs had just before, or just after.
 fn copied(matches: &Matches, output: usize, inputs: &[usize]) -> u64 {
-    let origins = matches.origins.get(&output).into_iter().flatten();
+    let origins = matches.origins.get(output).into_iter().flatten();
     let before = origins.filter(|(from, _)| from.iter().any(|f| inputs.contains(f)));
-    let later = matches.later.get(&output).into_iter().flatten();
+    let later = matches.later.get(output).into_iter().flatten();
     let later = later.filter(|(input, _)| inputs.contains(input));
     let all = before
         .map(|(_, count)| count)
         .chain(later.map(|(_, count)| count));
-    all.sum::<u64>().min(matches.distinct[&output])
+    all.sum::<u64>().min(matches.distinct[output])
 }
 
 /// The nearer of two inputs with the same messages, which are on one path: the one whose lag clearly varies
@@ -296,7 +291,7 @@ fn copied(matches: &Matches, output: usize, inputs: &[usize]) -> u64 {
 fn nearest(matches: &Matches, output: usize, inputs: &[usize]) -> Vec<usize> {
     let pair = |input: usize| matches.pairs[&(input, output)];
     let together = |a: usize, b: usize| -> u64 {
-        let origins = matches.origins.get(&output).into_iter().flatten();
+        let origins = matches.origins.get(output).into_iter().flatten();
         let both = origins.filter(|(from, _)| from.contains(&a) && from.contains(&b));
         both.map(|(_, count)| count).sum()
     };
@@ -415,7 +410,7 @@ mod tests {
             (1, 21, 8),
         ]);
         assert_eq!(found.pairs[&(0, 1)].before, 2);
-        assert_eq!(found.distinct, [(0, 2), (1, 2)].into());
+        assert_eq!(found.distinct, vec![2, 2].into());
     }
 
     #[test]

@@ -30,7 +30,7 @@ pub(crate) fn announced(context: &mut SourceContext<'_>) {
     let mut offers = offers(&text);
     offers.sort();
     if let Ok(count @ 1..) = u32::try_from(offers.len()) {
-        context.facts.offers.insert(context.place, count);
+        *context.facts.offers.grown(context.place) = count;
     }
     let same = offers.chunk_by(|a, b| a == b).map(|same| {
         let times = if same.len() > 1 {

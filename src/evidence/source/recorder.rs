@@ -1,7 +1,8 @@
 //! The recorder: it subscribes to every recorded topic (views hide it unless requested), and states which messages it lost.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
+use crate::base::ids::ById;
 use crate::base::name::is_recorder;
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind, Inference, Validity};
@@ -97,27 +98,23 @@ pub(crate) fn read_lost(
 
 /// Adds the losses; consecutive reports are combined.
 pub(crate) fn conclude_lost(source: SourceId, known: &mut Conclusions<'_>) {
-    let mut lost: BTreeMap<Name, Vec<(Stamp, u64)>> = BTreeMap::new();
+    let mut lost: ById<Name, Vec<(Stamp, u64)>> = ById::default();
     for fact in known.facts.list.clone() {
         if let Observation::Lost(topic, many) = fact.observation
             && known.is_recorded(topic)
             && let Ok(many @ 1..) = known.text(many).parse::<u64>()
         {
             let times = known.times(&fact).into_iter();
-            lost.entry(topic)
-                .or_default()
-                .extend(times.map(|time| (time, many)));
+            lost.grown(topic).extend(times.map(|time| (time, many)));
         }
     }
-    for (topic, mut reports) in lost {
+    for reports in lost.iter_mut() {
         reports.sort_unstable();
+    }
+    for (topic, reports) in lost.with_ids() {
         for (time, many) in reports {
-            known.incident(
-                source,
-                ElementKey::Topic(topic),
-                IncidentKind::Lost(many),
-                time,
-            );
+            let what = ElementKey::Topic(topic);
+            known.incident(source, what, IncidentKind::Lost(*many), *time);
         }
     }
 }

@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::base::ids::ById;
 use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::observation::{Name, SourceId};
 
@@ -36,12 +37,12 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
 
 /// The nodes that share their last part, each with its namespace and publications.
 fn families(known: &Conclusions<'_>) -> BTreeMap<String, Vec<Twin>> {
-    let mut published: BTreeMap<Name, Vec<Name>> = BTreeMap::new();
+    let mut published: ById<Name, Vec<Name>> = ById::default();
     for (node, topic) in known.publications() {
-        published.entry(node).or_default().push(topic);
+        published.grown(node).push(topic);
     }
     let mut families: BTreeMap<String, Vec<Twin>> = BTreeMap::new();
-    for (node, topics) in published {
+    for (node, topics) in published.with_ids() {
         let name = known.text(node);
         let Some((space, last)) = name.rsplit_once('/').filter(|(space, _)| !space.is_empty())
         else {

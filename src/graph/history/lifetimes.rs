@@ -1,7 +1,7 @@
 //! The lifetimes of nodes from those of their edges, of edges within those of their nodes, of topics from
 //! both.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::rc::Rc;
 
 use crate::base::rhythm::{
@@ -12,6 +12,7 @@ use crate::base::time::{Span, Stamp};
 use crate::evidence::inference::ElementKey;
 use crate::evidence::observation::Name;
 use crate::evidence::{Confidence, Evidence};
+use crate::graph::ById;
 use crate::graph::history::restarts::{Restart, Restarts};
 use crate::graph::history::tracks::Tracks;
 use crate::graph::history::{Bound, Stretch, hide};
@@ -26,7 +27,7 @@ pub(crate) fn compute_lifetimes(
     restarts: &Restarts,
     mission: (Stamp, Stamp),
 ) {
-    let mut closed: BTreeMap<Name, Option<Stamp>> = BTreeMap::new();
+    let mut closed: ById<Name, Option<Option<Stamp>>> = ById::default();
     // An edge that exists as long as its node is evidence for its topic, but not for the node.
     let of_nodes = likes
         .iter()
@@ -44,7 +45,7 @@ pub(crate) fn compute_lifetimes(
         let [Some(node), Some(topic)] = what.ends() else {
             continue;
         };
-        let last = closed.entry(node).or_insert(Some(Stamp::MIN));
+        let last = closed.grown(node).get_or_insert(Some(Stamp::MIN));
         *last = last.and_then(|last| track.closed(last));
         let learner = tracks.entry(ElementKey::Node(node)).or_default();
         if followers.contains(what)
@@ -59,7 +60,7 @@ pub(crate) fn compute_lifetimes(
         known.know(track, is_recorded(what));
     }
     // A node ended if its last connection was closed and it has no later sign.
-    for (node, end) in closed {
+    for (node, end) in closed.somes() {
         let end = end.filter(|end| *end > Stamp::MIN);
         if let (Some(end), Some(track)) = (end, tracks.get_mut(&ElementKey::Node(node)))
             && track.signs.iter().all(|sign| *sign <= end)
@@ -70,13 +71,13 @@ pub(crate) fn compute_lifetimes(
     for (what, track) in tracks.iter_mut() {
         if let ElementKey::Node(node) = what {
             track.live(mission, true);
-            for restart in restarts.get(node).into_iter().flatten() {
+            for restart in restarts.of(*node) {
                 track.restart(restart);
             }
         }
     }
-    let mut of_topics: BTreeMap<Name, Vec<Lifetime>> = BTreeMap::new();
-    let mut of_recorders: BTreeMap<Name, Vec<Lifetime>> = BTreeMap::new();
+    let mut of_topics: ById<Name, Vec<Lifetime>> = ById::default();
+    let mut of_recorders: ById<Name, Vec<Lifetime>> = ById::default();
     let mut recorded: Vec<ElementKey> = Vec::new();
     for (what, track) in &mut edges {
         let [Some(node), Some(topic)] = what.ends() else {
@@ -85,25 +86,25 @@ pub(crate) fn compute_lifetimes(
         let around = tracks.get(&ElementKey::Node(node));
         track.live_within(&around.map(|t| Rc::clone(&t.lives)).unwrap_or_default());
         if is_recorded(what) {
-            add_lives(of_recorders.entry(topic).or_default(), &track.lives);
+            add_lives(of_recorders.grown(topic), &track.lives);
             recorded.push(*what);
         } else {
-            add_lives(of_topics.entry(topic).or_default(), &track.lives);
+            add_lives(of_topics.grown(topic), &track.lives);
         }
     }
     tracks.append(&mut edges);
     live_like(tracks, likes, false, |what, lives| {
         if let [_, Some(topic)] = what.ends() {
-            add_lives(of_topics.entry(topic).or_default(), lives);
+            add_lives(of_topics.grown(topic), lives);
         }
     });
     for (what, track) in tracks.iter_mut() {
         if let ElementKey::Topic(topic) = what {
-            let edges = of_topics.remove(topic).unwrap_or_default();
+            let edges = std::mem::take(of_topics.grown(*topic));
             track.live(mission, false);
             track.live_with(edges);
             if track.lives.is_empty() {
-                track.live_with(of_recorders.remove(topic).unwrap_or_default());
+                track.live_with(std::mem::take(of_recorders.grown(*topic)));
             }
         }
     }

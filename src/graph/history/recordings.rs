@@ -11,6 +11,7 @@ use crate::evidence::clock::{DAY, FAR_DAYS};
 use crate::evidence::collector::Recorded;
 use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::observation::Name;
+use crate::graph::ById;
 use crate::graph::history::Stretch;
 use crate::graph::history::restarts::Restarts;
 use crate::graph::history::senders::{Sender, Traffic};
@@ -54,14 +55,14 @@ pub(crate) fn recordings(recorded: &Recorded, streams: &[Stream]) -> Vec<Option<
             }
         }
     }
-    let mut whole: BTreeMap<usize, (Stamp, Stamp)> = BTreeMap::new();
+    let mut whole: ById<usize, Option<(Stamp, Stamp)>> = ById::default();
     for ((span, _), one) in bags.iter().zip(&of) {
         if let Some((from, to)) = *span {
-            let all = whole.entry(*one).or_insert((from, to));
+            let all = whole.grown(*one).get_or_insert((from, to));
             *all = (all.0.min(from), all.1.max(to));
         }
     }
-    of.iter().map(|one| whole.get(one).copied()).collect()
+    of.iter().map(|one| whole.some(*one).copied()).collect()
 }
 
 /// The nodes that several recordings contain at the same time as publishers of one topic: of several robots,
@@ -154,7 +155,7 @@ pub(crate) fn pauses(
     streams: &[Stream],
 ) -> io::Result<Vec<Span>> {
     let mut senders = Vec::new();
-    for of_topic in traffic.values() {
+    for of_topic in traffic {
         for (place, sender) in of_topic.list.iter().enumerate() {
             if sender.latched || sender.stretches.iter().all(|s| s.count < FEWEST) {
                 continue;
@@ -204,7 +205,7 @@ pub(crate) fn pauses(
 
 /// The times without any message that are too long for a mission: the clock was set in between.
 fn clock_jumps(traffic: &Traffic) -> Vec<Span> {
-    let senders = traffic.values().flat_map(|of| &of.list);
+    let senders = traffic.iter().flat_map(|of| &of.list);
     let stretches = senders.flat_map(|sender| &sender.stretches);
     let mut sending: Vec<Span> = stretches.map(|s| Span::new(s.first, s.last)).collect();
     sending.sort_unstable_by_key(|span| span.start);
@@ -255,9 +256,9 @@ fn pause(senders: &[&SendingNode<'_>], restarts: &Restarts, gap: Span) -> Option
         let Some((last, next)) = sender.gap(gap.start, near) else {
             continue;
         };
-        let of_node = sender.node.and_then(|node| restarts.get(&node)).into_iter();
+        let of_node = sender.node.map_or(&[][..], |node| restarts.of(node));
         let has_restarted = of_node
-            .flatten()
+            .iter()
             .any(|r| r.death < gap.end && gap.start < r.birth);
         if has_restarted || next.is_some_and(|next| gap.end.since(next) > near) {
             continue;
@@ -338,7 +339,7 @@ mod tests {
         let senders: Vec<&SendingNode<'_>> = senders.iter().collect();
         let found = gaps(&senders).into_iter();
         let mut found: Vec<_> = found
-            .filter_map(|gap| pause(&senders, &Restarts::new(), gap))
+            .filter_map(|gap| pause(&senders, &Restarts::default(), gap))
             .map(|(pause, _)| (pause.start.0 / MILLI, pause.end.0 / MILLI))
             .collect();
         found.dedup();

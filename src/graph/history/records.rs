@@ -1,7 +1,7 @@
 //! The elements of the mission with everything that does not depend on windows: their lifetimes, publishing
 //! and silences.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::io;
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ use crate::graph::history::tracks::fall_silent;
 use crate::graph::history::tracks::{Tracks, tracks};
 use crate::graph::history::{Bound, Life, Sender, Sending, Stretch, Transition, all_silent};
 use crate::graph::{
-    Edge, Element, Elements, Existence, Node, NodeId, PerElement, State, Topic, TopicId,
+    ById, Edge, Element, Elements, Existence, Node, NodeId, PerElement, State, Topic, TopicId,
 };
 
 /// The history of a mission: its elements with their lifetimes, and the messages of all senders, in
@@ -44,10 +44,10 @@ pub(crate) struct History {
     pub(crate) transitions: Vec<Transition>,
     /// Statements about elements other than that they exist, by element.
     pub(crate) incidents: Vec<Incident>,
-    pub(crate) node_ids: BTreeMap<Name, NodeId>,
-    pub(crate) topic_ids: BTreeMap<Name, TopicId>,
+    pub(crate) node_ids: ById<Name, Option<NodeId>>,
+    pub(crate) topic_ids: ById<Name, Option<TopicId>>,
     /// The indices of each topic's streams.
-    pub(crate) streams: BTreeMap<Name, Vec<usize>>,
+    pub(crate) streams: ById<Name, Vec<usize>>,
 }
 
 /// A statement about an element other than that it exists.
@@ -158,9 +158,7 @@ fn assembled(
     findings: &Findings,
     (pauses, doubled): (Vec<Span>, BTreeSet<Name>),
 ) -> History {
-    let streams = traffic
-        .iter()
-        .map(|(topic, of)| (*topic, of.streams.clone()));
+    let streams = traffic.iter().map(|of| of.streams.clone());
     let mut all = Assembly {
         history: History {
             streams: streams.collect(),
@@ -169,12 +167,12 @@ fn assembled(
         },
         findings,
         traffic,
-        publishers: BTreeMap::new(),
+        publishers: ById::default(),
         sent: sent(traffic),
     };
     for (what, track) in &tracks {
         if let (ElementKey::Publish(_, topic), false) = (what, track.evidence.is_guess()) {
-            *all.publishers.entry(*topic).or_default() += 1;
+            *all.publishers.grown(*topic) += 1;
         }
     }
     for (what, track) in tracks {
@@ -190,7 +188,7 @@ fn assembled(
     all.incidents();
     let ids = doubled
         .iter()
-        .filter_map(|node| all.history.node_ids.get(node));
+        .filter_map(|node| all.history.node_ids.some(*node));
     all.history.doubled = ids.copied().collect();
     all.history
 }
@@ -217,12 +215,12 @@ fn roomy(tracks: &Tracks) -> History {
 }
 
 /// The messages that each node sends, without latched ones.
-fn sent(traffic: &Traffic) -> BTreeMap<Name, Vec<&TopicSender>> {
-    let mut sent: BTreeMap<Name, Vec<&TopicSender>> = BTreeMap::new();
-    let senders = traffic.values().flat_map(|of| &of.list);
+fn sent(traffic: &Traffic) -> ById<Name, Vec<&TopicSender>> {
+    let mut sent: ById<Name, Vec<&TopicSender>> = ById::default();
+    let senders = traffic.iter().flat_map(|of| &of.list);
     for sender in senders.filter(|sender| !sender.latched) {
         if let Some(node) = sender.node {
-            sent.entry(node).or_default().push(sender);
+            sent.grown(node).push(sender);
         }
     }
     sent
@@ -233,20 +231,20 @@ struct Assembly<'a> {
     findings: &'a Findings,
     traffic: &'a Traffic,
     /// The number of known publishers of each topic.
-    publishers: BTreeMap<Name, u32>,
+    publishers: ById<Name, u32>,
     /// The messages that each node sends, without latched ones.
-    sent: BTreeMap<Name, Vec<&'a TopicSender>>,
+    sent: ById<Name, Vec<&'a TopicSender>>,
 }
 
 impl Assembly<'_> {
     /// Adds the messages of every sender.
     fn senders(&mut self) {
-        for (topic, of) in self.traffic {
-            let Some(id) = self.history.topic_ids.get(topic) else {
+        for (topic, of) in self.traffic.with_ids() {
+            let Some(id) = self.history.topic_ids.some(topic) else {
                 continue;
             };
             for sender in of.list.iter().filter(|s| !s.stretches.is_empty()) {
-                let node = sender.node.and_then(|n| self.history.node_ids.get(&n));
+                let node = sender.node.and_then(|n| self.history.node_ids.some(n));
                 self.history.sending.senders.push(Sender {
                     topic: *id,
                     node: node.copied(),
@@ -259,8 +257,8 @@ impl Assembly<'_> {
 
     /// Adds the times at which nodes changed their lifecycle states.
     fn transitions(&mut self) {
-        for (node, id) in &self.history.node_ids {
-            let states = self.findings.values.transitions(*node);
+        for (node, id) in self.history.node_ids.somes() {
+            let states = self.findings.values.transitions(node);
             let states = states.map(|(time, state)| Transition {
                 node: *id,
                 time: *time,
@@ -277,8 +275,8 @@ impl Assembly<'_> {
         let all = &mut self.history;
         for incident in &self.findings.incidents {
             let [node, topic] = incident.what.ends();
-            let node = node.and_then(|name| all.node_ids.get(&name).copied());
-            let topic = topic.and_then(|name| all.topic_ids.get(&name).copied());
+            let node = node.and_then(|name| all.node_ids.some(name).copied());
+            let topic = topic.and_then(|name| all.topic_ids.some(name).copied());
             let edge = node.zip(topic);
             let what = match &incident.what {
                 ElementKey::Node(_) => node.map(Element::Node),
@@ -305,7 +303,7 @@ impl Assembly<'_> {
             name: text.into(),
             seen: seen(track),
         });
-        all.node_ids.insert(name, id);
+        *all.node_ids.grown(name) = Some(id);
         let mut record = Record::new(track, self.findings.mission, silent);
         // A node's lifetime depends on more than messages.
         record.needs_messages = false;
@@ -318,7 +316,7 @@ impl Assembly<'_> {
     fn topic(&mut self, name: Name, track: &Liveness) {
         let silent = self.topic_silences(name, &spans(track));
         let unknown_publishers = self.unknown_publishers(name);
-        let traffic = self.traffic.get(&name);
+        let traffic = self.traffic.get(name);
         let streams = traffic.iter().flat_map(|of| &of.streams);
         let values = &self.findings.values;
         let mut types: Vec<_> = streams
@@ -336,7 +334,7 @@ impl Assembly<'_> {
             qos: values.quality(name),
             unknown_publishers,
         });
-        all.topic_ids.insert(name, id);
+        *all.topic_ids.grown(name) = Some(id);
         let pauses = traffic.map(|of| of.pauses.clone());
         all.sending.pauses.push(pauses.unwrap_or_default());
         let record = Record::new(track, self.findings.mission, silent);
@@ -345,16 +343,16 @@ impl Assembly<'_> {
 
     /// The number of publishers of a topic that the bag counts beyond the known ones.
     fn unknown_publishers(&self, topic: Name) -> Option<u32> {
-        let counted = *self.findings.offers.get(&topic)?;
-        let known = self.publishers.get(&topic).copied().unwrap_or(0);
-        Some(counted.saturating_sub(known))
+        let counted = self.findings.offers.get(topic).filter(|many| **many > 0)?;
+        let known = self.publishers.get(topic).unwrap_or(&0);
+        Some(counted.saturating_sub(*known))
     }
 
     fn publish(&mut self, node: Name, topic: Name, track: &Liveness) {
         let Some(edge) = self.edge(node, topic, track) else {
             return;
         };
-        let senders = self.traffic.get(&topic).map(|of| &of.list);
+        let senders = self.traffic.get(topic).map(|of| &of.list);
         let sender = senders.and_then(|all| all.iter().find(|s| s.node == Some(node)));
         let silent = self.silences(sender.into_iter(), &spans(track));
         let all = &mut self.history;
@@ -376,21 +374,21 @@ impl Assembly<'_> {
     /// An edge between elements that were added before; `None` if one of them was not.
     fn edge(&self, node: Name, topic: Name, track: &Liveness) -> Option<Edge> {
         Some(Edge {
-            node: *self.history.node_ids.get(&node)?,
-            topic: *self.history.topic_ids.get(&topic)?,
+            node: *self.history.node_ids.some(node)?,
+            topic: *self.history.topic_ids.some(topic)?,
             seen: seen(track),
         })
     }
 
     /// The times at which all senders of a topic are silent.
     fn topic_silences(&self, topic: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
-        let all = self.traffic.get(&topic).into_iter().flat_map(|of| &of.list);
+        let all = self.traffic.get(topic).into_iter().flat_map(|of| &of.list);
         self.silences(all.filter(|sender| !sender.latched), lives)
     }
 
     /// The times at which a node is silent on all its topics.
     fn node_silences(&self, node: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
-        let of = self.sent.get(&node).into_iter().flatten().copied();
+        let of = self.sent.of(node).iter().copied();
         self.silences(of, lives)
     }
 

@@ -13,6 +13,7 @@ use crate::evidence::conclude::Findings;
 use crate::evidence::inference::{Inference, Reliability, Validity};
 use crate::evidence::numbers::Number;
 use crate::evidence::observation::Name;
+use crate::graph::ById;
 use crate::graph::history::Stretch;
 use crate::graph::history::senders::{Sender, Traffic};
 
@@ -24,7 +25,7 @@ pub(crate) struct Restart {
 }
 
 /// Restarts by node, sorted by time.
-pub(crate) type Restarts = BTreeMap<Name, Vec<Restart>>;
+pub(crate) type Restarts = ById<Name, Vec<Restart>>;
 
 /// The most messages of a latched topic: one with more is sent again all the time.
 const LATCHED: u64 = 20;
@@ -82,9 +83,9 @@ impl Own<'_> {
 }
 
 /// The streams of each publisher with a reliable name.
-fn own_streams<'a>(findings: &Findings, traffic: &'a Traffic) -> BTreeMap<Name, Vec<Own<'a>>> {
-    let mut of: BTreeMap<Name, Vec<Own<'a>>> = BTreeMap::new();
-    for (topic, all) in traffic {
+fn own_streams<'a>(findings: &Findings, traffic: &'a Traffic) -> ById<Name, Vec<Own<'a>>> {
+    let mut own: ById<Name, Vec<Own<'a>>> = ById::default();
+    for (topic, all) in traffic.with_ids() {
         let mut streams: Vec<Vec<usize>> = vec![Vec::new(); all.list.len()];
         for (at, of) in all.streams.iter().zip(&all.of) {
             streams[*of].push(*at);
@@ -92,15 +93,15 @@ fn own_streams<'a>(findings: &Findings, traffic: &'a Traffic) -> BTreeMap<Name, 
         for (sender, streams) in all.list.iter().zip(streams) {
             let is_whole = |at: &usize| findings.streams[*at].trust == Reliability::Whole;
             if let Some(node) = sender.node.filter(|_| streams.iter().all(is_whole)) {
-                of.entry(node).or_default().push(Own {
-                    topic: *topic,
+                own.grown(node).push(Own {
+                    topic,
                     sender,
                     streams,
                 });
             }
         }
     }
-    of
+    own
 }
 
 /// The gaps in any of a node's streams during which none of its other streams continued.
@@ -155,7 +156,7 @@ type Place = (Stamp, usize);
 
 /// The numbered streams of a sender, with the times of their messages. A split recording has one for each part.
 fn numbered(recorded: &Recorded, own: &Own<'_>) -> io::Result<Vec<(usize, Vec<Stamp>)>> {
-    let is_numbered = |at: &&usize| recorded.numbers.contains_key(at);
+    let is_numbered = |at: &&usize| recorded.numbers.some(**at).is_some();
     let times = |at: &usize| Ok((*at, recorded.messages.times(recorded.streams[*at].times)?));
     own.streams.iter().filter(is_numbered).map(times).collect()
 }
@@ -180,9 +181,9 @@ pub(crate) fn unread(
     traffic: &Traffic,
 ) -> Result<BTreeSet<(usize, Stamp)>> {
     let mut asked = BTreeSet::new();
-    for own in own_streams(findings, traffic).values() {
+    for own in &own_streams(findings, traffic) {
         let is_unread = |at: &&usize| {
-            let read = recorded.numbers.get(at).map(|numbers| numbers.read);
+            let read = recorded.numbers.some(**at).map(|numbers| numbers.read);
             read.is_some_and(|read| read < recorded.messages.count(recorded.streams[**at].times))
         };
         let is_known = |own: &Own<'_>| !own.streams.iter().any(|at| is_unread(&at));
@@ -211,30 +212,32 @@ pub(crate) fn restarts(
     doubled: &BTreeSet<Name>,
 ) -> io::Result<Restarts> {
     if recorded.overlaps {
-        return Ok(Restarts::new());
+        return Ok(Restarts::default());
     }
     let mut nodes = own_streams(findings, traffic);
     // The messages of two robots under one name overlap in time.
-    nodes.retain(|node, _| !doubled.contains(node));
-    let mut falls: BTreeMap<Name, Vec<Fall>> = BTreeMap::new();
-    for (node, own) in &nodes {
-        falls.insert(*node, falls_of(recorded, findings, *node, own)?);
+    for node in doubled {
+        nodes.grown(*node).clear();
     }
+    let falls = nodes
+        .with_ids()
+        .map(|(node, own)| falls_of(recorded, findings, node, own));
+    let falls: ById<Name, Vec<Fall>> = falls.collect::<io::Result<_>>()?;
     let mut alike: BTreeMap<_, Vec<(Name, &Fall)>> = BTreeMap::new();
     for (node, fall) in falls
-        .iter()
-        .flat_map(|(node, of)| of.iter().map(|f| (*node, f)))
+        .with_ids()
+        .flat_map(|(node, of)| of.iter().map(move |f| (node, f)))
     {
         if fall.first.stamp != 0 {
             alike.entry(fall.header()).or_default().push((node, fall));
         }
     }
     let said = said(&findings.inferences);
-    let mut all = Restarts::new();
-    for (node, own) in &nodes {
+    let mut all = Restarts::default();
+    for (node, own) in nodes.with_ids() {
         let is_copy = |fall: &&Fall| {
             let mut alike = alike.get(&fall.header()).into_iter().flatten();
-            alike.any(|(other, of)| other != node && fall.is_later_than(of))
+            alike.any(|(other, of)| *other != node && fall.is_later_than(of))
         };
         let own_falls = falls[node].iter().filter(|fall| !is_copy(fall));
         let mut breaks: Vec<_> = own_falls.map(|fall| (fall.from, fall.to)).collect();
@@ -249,15 +252,12 @@ pub(crate) fn restarts(
         let streams = own.iter().flat_map(|own| &own.streams);
         let times = streams.map(|at| recorded.messages.times(recorded.streams[*at].times));
         let mut signs = times.collect::<io::Result<Vec<_>>>()?.concat();
-        let inferences = said.get(node).into_iter().flatten();
+        let inferences = said.of(node).iter();
         signs.extend(inferences.copied().flat_map(signs_of));
         signs.sort_unstable();
         let gaps = breaks.iter();
-        let gaps = gaps.filter_map(|(from, to)| widest_gap(&signs, *from, *to));
-        let found: Vec<Restart> = gaps.collect();
-        if !found.is_empty() {
-            all.insert(*node, found);
-        }
+        all.grown(node)
+            .extend(gaps.filter_map(|(from, to)| widest_gap(&signs, *from, *to)));
     }
     Ok(all)
 }
@@ -268,7 +268,7 @@ fn counts_on(recorded: &Recorded, log: &Own<'_>, gap: (Stamp, Stamp)) -> bool {
     log.streams.iter().any(|at| {
         let times = recorded.messages.times(recorded.streams[*at].times);
         let around = times.ok().and_then(|times| around(&times, gap));
-        let numbers = recorded.numbers.get(at);
+        let numbers = recorded.numbers.some(*at);
         around
             .zip(numbers)
             .is_some_and(|((from, to), numbers)| numbers.count_on(from, to))
@@ -326,7 +326,7 @@ fn falls_of(
             breaks.extend(between_records(recorded, &streams).map(|places| (places, Vec::new())));
         }
         for (((last, before), (next, after)), gaps) in breaks {
-            let number = |at: usize, time| recorded.numbers.get(&at)?.at(time);
+            let number = |at: usize, time| recorded.numbers.some(at)?.at(time);
             let numbers = number(before, last).zip(number(after, next));
             let common = gaps.iter().fold((last, next), |all, gap| {
                 (all.0.max(gap.0), all.1.min(gap.1))
@@ -371,18 +371,22 @@ fn between_records(
         .collect();
     let next = next.into_iter().filter(|(last, first)| last.0 < first.0);
     let inside = streams.iter().flat_map(|(at, _)| {
-        let falls = recorded.numbers[at].falls.iter();
+        let falls = recorded
+            .numbers
+            .some(*at)
+            .into_iter()
+            .flat_map(|own| &own.falls);
         falls.map(|(from, to)| ((*from, *at), (*to, *at)))
     });
     next.chain(inside)
 }
 
 /// All statements about each node.
-fn said(inferences: &[Inference]) -> BTreeMap<Name, Vec<&Inference>> {
-    let mut of: BTreeMap<Name, Vec<&Inference>> = BTreeMap::new();
+fn said(inferences: &[Inference]) -> ById<Name, Vec<&Inference>> {
+    let mut of: ById<Name, Vec<&Inference>> = ById::default();
     for inference in inferences {
         if let [Some(node), _] = inference.what.ends() {
-            of.entry(node).or_default().push(inference);
+            of.grown(node).push(inference);
         }
     }
     of

@@ -1,7 +1,6 @@
 //! The messages of every sender on every topic over the whole mission: even stretches, pauses, first and last
 //! messages.
 
-use std::collections::BTreeMap;
 use std::io;
 
 use crate::base::error::Result;
@@ -12,14 +11,15 @@ use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
 use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::observation::Name;
+use crate::graph::ById;
 use crate::graph::history::recordings::recordings;
 use crate::graph::history::{LongestPauses, Stretch};
 
 /// The senders of each topic.
-pub(crate) type Traffic = BTreeMap<Name, Senders>;
+pub(crate) type Traffic = ById<Name, Senders>;
 
-/// The senders of one topic.
-#[derive(Debug)]
+/// The senders of one topic; empty for other names.
+#[derive(Default)]
 pub(crate) struct Senders {
     /// The indices of the topic's streams, sorted.
     pub(crate) streams: Vec<usize>,
@@ -61,13 +61,11 @@ pub(crate) fn sender(stream: &Stream) -> Option<Name> {
 /// Reads the times of every topic once.
 pub(crate) fn traffic(recorded: &Recorded, findings: &Findings) -> Result<Traffic> {
     let recordings = recordings(recorded, &findings.streams);
-    let mut streams: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
+    let mut streams: ById<Name, Vec<usize>> = ById::default();
     for (at, stream) in findings.streams.iter().enumerate() {
-        streams.entry(stream.topic).or_default().push(at);
+        streams.grown(stream.topic).push(at);
     }
-    let of_topic = |(topic, of): (Name, Vec<usize>)| {
-        Ok((topic, senders(recorded, findings, &recordings, of)?))
-    };
+    let of_topic = |of| senders(recorded, findings, &recordings, of);
     let all: io::Result<Traffic> = streams.into_iter().map(of_topic).collect();
     all.map_err(spool_error)
 }
@@ -158,44 +156,29 @@ impl SenderTimes {
     }
 }
 
-/// The streams of one sender together.
-struct Together {
-    latched: bool,
-    /// The first and the last moment of its recordings that are not empty.
-    recording: Option<(Stamp, Stamp)>,
-}
-
 /// The index of each stream's sender, and the senders without times yet.
 fn places(
     streams: &[&Stream],
     recordings: &[Option<(Stamp, Stamp)>],
 ) -> (Vec<usize>, Vec<SenderTimes>) {
-    let mut senders: BTreeMap<Option<Name>, Together> = BTreeMap::new();
-    for stream in streams {
-        let together = senders.entry(sender(stream)).or_insert(Together {
-            latched: true,
-            recording: None,
-        });
-        together.latched &= stream.latched;
-        if let Some(own) = recordings[stream.bag] {
-            let all = together.recording.get_or_insert(own);
-            *all = (all.0.min(own.0), all.1.max(own.1));
+    let mut nodes: Vec<Option<Name>> = streams.iter().map(|stream| sender(stream)).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    let place = |stream: &&Stream| nodes.binary_search(&sender(stream)).unwrap_or(0);
+    let received = nodes.iter().map(|node| {
+        let own = || streams.iter().filter(|stream| sender(stream) == *node);
+        let reached = own().filter_map(|stream| recordings[stream.bag]);
+        let reached = reached.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        SenderTimes {
+            node: *node,
+            latched: own().all(|stream| stream.latched),
+            recording: reached.unwrap_or((Stamp::MIN, Stamp::MAX)),
+            times: Vec::new(),
+            every: 1,
+            passed: 0,
         }
-    }
-    let places: BTreeMap<Option<Name>, usize> = senders.keys().copied().zip(0..).collect();
-    let places = streams
-        .iter()
-        .map(|stream| places[&sender(stream)])
-        .collect();
-    let received = senders.iter().map(|(node, together)| SenderTimes {
-        node: *node,
-        latched: together.latched,
-        recording: together.recording.unwrap_or((Stamp::MIN, Stamp::MAX)),
-        times: Vec::new(),
-        every: 1,
-        passed: 0,
     });
-    (places, received.collect())
+    (streams.iter().map(place).collect(), received.collect())
 }
 
 // Stretches of even messages, from the times of one sender: gaps and rate changes end them.

@@ -12,6 +12,7 @@ use crate::evidence::conclude::Findings;
 use crate::evidence::inference::{ElementKey, Inference, Reliability, Validity};
 use crate::evidence::observation::Name;
 use crate::evidence::{Confidence, Evidence, SOURCES};
+use crate::graph::ById;
 use crate::graph::history::lifetimes::{Extent, Liveness, Pulse};
 use crate::graph::history::restarts::{Restart, Restarts};
 use crate::graph::history::senders::{Sender, Senders, Traffic};
@@ -48,8 +49,7 @@ pub(crate) fn tracks(
     let findings = &*findings;
     for inference in inferences {
         let [node, _] = inference.what.ends();
-        let own = node.and_then(|node| restarts.get(&node));
-        let own = own.map_or(&[][..], Vec::as_slice);
+        let own = node.map_or(&[][..], |node| restarts.of(node));
         let deaths: Vec<Stamp> = own.iter().map(|r| r.death).collect();
         let track = tracks.entry(inference.what).or_default();
         track.lasts |= lasts(&inference.when);
@@ -60,7 +60,7 @@ pub(crate) fn tracks(
         match &inference.when {
             Validity::Messages(at) => {
                 let stream = &findings.streams[*at];
-                let Some(senders) = traffic.get(&stream.topic) else {
+                let Some(senders) = traffic.get(stream.topic) else {
                     continue;
                 };
                 let place = senders.place(*at).unwrap_or(0);
@@ -72,7 +72,7 @@ pub(crate) fn tracks(
                     known: node.is_none() && sent.contains(at),
                     begins: !is_free && !with_start,
                     beats: !is_free && !with_end,
-                    asked: node.and_then(|node| asked.get(&node)).copied(),
+                    asked: node.and_then(|node| asked.some(node)).copied(),
                     restarts: own,
                     pauses,
                 };
@@ -84,7 +84,7 @@ pub(crate) fn tracks(
             }
             Validity::First(at) => {
                 let stream = &findings.streams[*at];
-                if let Some(senders) = traffic.get(&stream.topic)
+                if let Some(senders) = traffic.get(stream.topic)
                     && let Some(place) = senders.place(*at)
                     && let Some((first, _)) = senders.traces[place]
                 {
@@ -117,9 +117,9 @@ pub(crate) fn tracks(
             Validity::Always => track.extent = Extent::Always,
         }
     }
-    for (node, restarts) in restarts {
-        let track = tracks.entry(ElementKey::Node(*node)).or_default();
+    for (node, restarts) in restarts.with_ids() {
         for restart in restarts {
+            let track = tracks.entry(ElementKey::Node(node)).or_default();
             track.signs.extend([restart.death, restart.birth]);
             track.ends.push(restart.death);
         }
@@ -130,7 +130,7 @@ pub(crate) fn tracks(
 /// The publications, as node and topic, that forward the messages of others, and whether they begin and end with
 /// these: then that says nothing about the node.
 fn forwarded(findings: &Findings, traffic: &Traffic) -> BTreeMap<(Name, Name), (bool, bool)> {
-    let bounds = |topic: &Name, node: Option<Name>| {
+    let bounds = |topic: Name, node: Option<Name>| {
         let senders = traffic.get(topic).into_iter().flat_map(|of| &of.list);
         let own = senders.filter(|s| node.is_none() || s.node == node);
         let stretches = || own.clone().flat_map(|s| &s.stretches);
@@ -150,8 +150,8 @@ fn forwarded(findings: &Findings, traffic: &Traffic) -> BTreeMap<(Name, Name), (
                 _ => None,
             });
         let inputs: BTreeSet<Name> = inputs.filter(|input| kind(*input) == kind(topic)).collect();
-        let inputs = || inputs.iter().filter_map(|input| bounds(input, None));
-        let ((first, early), (last, late)) = bounds(&topic, Some(node))?;
+        let inputs = || inputs.iter().filter_map(|input| bounds(*input, None));
+        let ((first, early), (last, late)) = bounds(topic, Some(node))?;
         inputs().next()?;
         let began = inputs().any(|((input, _), _)| first.since(input) > broken_after(early));
         let goes_on = inputs().any(|(_, (input, _))| input.since(last) > broken_after(late));
@@ -162,15 +162,15 @@ fn forwarded(findings: &Findings, traffic: &Traffic) -> BTreeMap<(Name, Name), (
 
 /// When others sent the first message to each node, on a topic below its name: what it sends at once is the answer
 /// of a node that was there.
-fn asked(findings: &Findings, traffic: &Traffic) -> BTreeMap<Name, Stamp> {
-    let senders = || traffic.values().flat_map(|of| &of.list);
+fn asked(findings: &Findings, traffic: &Traffic) -> ById<Name, Option<Stamp>> {
+    let senders = || traffic.iter().flat_map(|of| &of.list);
     let nodes: BTreeMap<_, Name> = senders()
         .filter_map(|sender| sender.node)
         .map(|node| (findings.text(node), node))
         .collect();
-    let mut asked = BTreeMap::new();
-    for (topic, of) in traffic {
-        let name = format!("/{}", findings.text(*topic).trim_start_matches('/'));
+    let mut asked: ById<Name, Option<Stamp>> = ById::default();
+    for (topic, of) in traffic.with_ids() {
+        let name = format!("/{}", findings.text(topic).trim_start_matches('/'));
         let Some((space, _)) = name.rsplit_once('/') else {
             continue;
         };
@@ -180,7 +180,7 @@ fn asked(findings: &Findings, traffic: &Traffic) -> BTreeMap<Name, Stamp> {
             .filter_map(|s| Some(s.stretches.first()?.first))
             .min();
         if let Some((owner, first)) = owner.zip(first) {
-            let known = asked.entry(*owner).or_insert(first);
+            let known = asked.grown(*owner).get_or_insert(first);
             *known = first.min(*known);
         }
     }
@@ -193,7 +193,7 @@ fn confidence(inference: &Inference, findings: &Findings, traffic: &Traffic) -> 
     let Validity::Messages(at) = inference.when else {
         return inference.confidence;
     };
-    let senders = traffic.get(&findings.streams[at].topic);
+    let senders = traffic.get(findings.streams[at].topic);
     let sent = senders.and_then(|senders| senders.traces[senders.place(at)?]);
     match sent {
         Some(_) => inference.confidence,
@@ -298,11 +298,11 @@ pub(crate) fn fall_silent(
     findings: &Findings,
     pauses: &[Span],
 ) {
-    for (topic, nodes) in publishers(tracks) {
+    for (topic, nodes) in publishers(tracks).with_ids() {
         let Some(sender) = merged(traffic, findings, topic) else {
             continue;
         };
-        for (node, stretches) in turns(&nodes, sender, findings) {
+        for (node, stretches) in turns(nodes, sender, findings) {
             let end = sender.recording.1.min(findings.mission.1);
             let Some(track) = tracks.get_mut(&ElementKey::Publish(node, topic)) else {
                 continue;
@@ -321,11 +321,11 @@ pub(crate) fn fall_silent(
 }
 
 /// The known publishers of each topic.
-fn publishers(tracks: &Tracks) -> BTreeMap<Name, Vec<Name>> {
-    let mut all: BTreeMap<Name, Vec<Name>> = BTreeMap::new();
+fn publishers(tracks: &Tracks) -> ById<Name, Vec<Name>> {
+    let mut all: ById<Name, Vec<Name>> = ById::default();
     for what in tracks.keys() {
         if let ElementKey::Publish(node, topic) = what {
-            all.entry(*topic).or_default().push(*node);
+            all.grown(*topic).push(*node);
         }
     }
     all
@@ -333,7 +333,7 @@ fn publishers(tracks: &Tracks) -> BTreeMap<Name, Vec<Name>> {
 
 /// The sender that represents all senders of a merged topic, unless messages are latched.
 fn merged<'a>(traffic: &'a Traffic, findings: &Findings, topic: Name) -> Option<&'a Sender> {
-    let of = traffic.get(&topic)?;
+    let of = traffic.get(topic)?;
     let is_merged = |at: &usize| findings.streams[*at].trust == Reliability::First;
     let sender = of.list.iter().find(|sender| sender.node.is_none())?;
     (of.streams.iter().all(is_merged) && !sender.latched).then_some(sender)
