@@ -22,7 +22,7 @@ const RARE: u64 = 10;
 const UNSET_DAYS: i64 = 3652;
 
 /// Days without a gap of more than [`FAR_DAYS`] between them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 struct DayCluster {
     first: i64,
     last: i64,
@@ -30,7 +30,7 @@ struct DayCluster {
 }
 
 /// The assessment of the times of a mission.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Belief {
     /// The credible times, if some messages are far from the bulk; `None` if all are credible.
     pub(crate) span: Option<Span>,
@@ -168,7 +168,7 @@ const SHARE: usize = 80;
 const NEAR_NS: i64 = 50_000_000;
 
 /// The offset of a recorder's clock.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct ClockOffset {
     /// The index of the bag among the inputs, and that of the one that it is compared with.
     pub(crate) bag: usize,

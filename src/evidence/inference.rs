@@ -51,7 +51,7 @@ pub(crate) enum Reliability {
 }
 
 /// A node, a topic or an edge.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum ElementKey {
     Node(Name),
     Topic(Name),
@@ -83,7 +83,7 @@ impl ElementKey {
 }
 
 /// The times during which an inference is valid.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug)]
 pub(crate) enum Validity {
     /// While there are messages of this stream.
     Messages(usize),
@@ -106,7 +106,7 @@ pub(crate) enum Validity {
 }
 
 /// A piece of evidence for an element.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Inference {
     pub(crate) what: ElementKey,
     pub(crate) source: SourceId,
@@ -155,7 +155,7 @@ fn gone(streams: &[Stream]) -> BTreeSet<Option<Name>> {
 }
 
 /// Everything known about a mission once all bags are read, and the conclusions so far.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Conclusions<'a> {
     pub(crate) streams: &'a [Stream],
     pub(crate) facts: Observations,
@@ -641,7 +641,7 @@ fn absences(signs: &[Stamp], snapshots: &[Stamp]) -> Vec<Stamp> {
 // Edges known not to exist: a complete list of a node's edges omits them.
 
 /// Complete lists of the topics that nodes publish and subscribe to, if there are any.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Closed {
     /// By node: all topics that a rospy node names as its own, or all that a snapshot of the graph shows for
     /// a node.
@@ -765,7 +765,7 @@ pub(crate) enum IncidentKind {
 }
 
 /// A statement about an element.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub(crate) struct Incident {
     pub(crate) what: ElementKey,
     pub(crate) kind: IncidentKind,

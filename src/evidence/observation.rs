@@ -456,7 +456,7 @@ fn note(
 }
 
 /// An observation with everything that belongs to it except its source and time.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) struct Statement {
     pub(crate) observation: Observation,
     pub(crate) confidence: Confidence,

@@ -402,7 +402,7 @@ fn is_own(streams: &[Stream], at: usize) -> bool {
 }
 
 /// The usual interval between the signs of a node.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Habit {
     last: Stamp,
     /// The longest time between two signs, in nanoseconds.

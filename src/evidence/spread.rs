@@ -1,7 +1,7 @@
 //! The variation of the lag between messages: of two streams on one path, that of the one closer to the output varies less.
 
 /// The lags seen so far.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Default)]
 pub(crate) struct Spread {
     count: f64,
     sum: f64,

@@ -430,7 +430,7 @@ fn decode(mut bytes: &[u8], count: usize) -> Vec<(Stamp, u32)> {
 // Several sequences of sorted blocks as one sorted sequence.
 
 /// One time from one of several sequences.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 pub(crate) struct Timed {
     /// The time.
     pub time: Stamp,

@@ -120,7 +120,6 @@ pub struct Edge {
 }
 
 /// The ends of each topic and the topics of each node, in order.
-#[derive(Clone, Debug)]
 pub(crate) struct Wiring {
     pub(crate) publishers: ById<TopicId, Vec<NodeId>>,
     pub(crate) subscribers: ById<TopicId, Vec<NodeId>>,

@@ -179,7 +179,6 @@ impl<'a> IntoIterator for &'a Graphs {
 }
 
 /// A writer of the graphs of windows, element by element.
-#[derive(Debug)]
 pub(crate) struct GraphsWriter(Graphs);
 
 impl GraphsWriter {
@@ -429,7 +428,7 @@ impl Default for Memory {
 }
 
 /// A writer of the rows of an element in order of their windows.
-#[derive(Clone, Debug, Default)]
+#[derive(Default)]
 pub(crate) struct ColumnWriter {
     bytes: Vec<u8>,
     memory: Memory,
@@ -689,7 +688,6 @@ fn take_number(bytes: &mut &[u8], last: &mut i64) -> Number {
 // previous window.
 
 /// The state of a walk through all columns.
-#[derive(Debug)]
 pub(crate) struct ColumnWalk<'a> {
     /// The next window.
     window: u64,

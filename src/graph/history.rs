@@ -230,7 +230,6 @@ pub(crate) fn begins_steadily(stretches: &[Stretch]) -> bool {
 }
 
 /// A transition of a node to a lifecycle state.
-#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Transition {
     pub(crate) node: NodeId,
     pub(crate) time: Stamp,
@@ -315,7 +314,7 @@ pub(crate) fn all_silent(
 const PAUSES: usize = 32;
 
 /// The longest pauses of one sequence of messages, collected message by message.
-#[derive(Clone, Debug, Default)]
+#[derive(Default)]
 pub(crate) struct LongestPauses {
     last: Option<Stamp>,
     /// The longest so far, by length; the shortest is replaced first.

@@ -21,7 +21,6 @@ use crate::graph::{
 };
 
 /// The graphs of the windows of one division of time.
-#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Windowed {
     /// A graph per window.
     pub graphs: Graphs,
@@ -76,7 +75,7 @@ struct GraphAssembly<'a> {
 }
 
 /// The messages of a node in one window.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Default)]
 struct Sent {
     count: u64,
     /// Those of topics that it sends throughout the window.
@@ -348,7 +347,7 @@ fn bytes(sum: Option<&Sums>, recorded: bool) -> Option<u64> {
 // their header stamps.
 
 /// Sums of one element in one window. A report belongs to windows by the share of its interval in each.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Default)]
 struct MeasureSum {
     delivered: Option<f64>,
     drops: Option<f64>,
@@ -362,7 +361,7 @@ struct MeasureSum {
 }
 
 /// The sums of all elements with any.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct WindowMeasures(BTreeMap<(Element, usize), MeasureSum>);
 
 impl WindowMeasures {
@@ -513,7 +512,6 @@ fn whole_number(sum: f64) -> u64 {
 // Rates: the messages of some streams per window, their bytes, periods and gaps.
 
 /// The messages of one topic, or of one of its publishers, in one window.
-#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Sums {
     pub(crate) window: usize,
     pub(crate) arrivals: Arrivals,
@@ -525,7 +523,7 @@ pub(crate) struct Sums {
 }
 
 /// The times of the messages in one window.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 pub(crate) struct Arrivals {
     /// The number of messages, ≥ 1.
     pub(crate) count: u64,
@@ -577,7 +575,7 @@ impl Arrivals {
 }
 
 /// The number of messages of a topic in a window.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct TopicCount {
     /// The topic's name.
     pub topic: Arc<str>,
@@ -731,7 +729,7 @@ fn median(gaps: &mut [i64]) -> Option<f64> {
 // Search for the windows that contain a moment or overlap an interval; windows may overlap.
 
 /// Windows sorted by start, none of them inside another.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) struct SortedWindows<'a>(pub(crate) &'a [Span]);
 
 impl SortedWindows<'_> {

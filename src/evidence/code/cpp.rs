@@ -519,7 +519,7 @@ fn namespace_hint(object: &str) -> &'static str {
 // The client libraries.
 
 /// The parts of a called name: `object.name<template>(…)`, `scope::name<template>(…)`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Default)]
 struct Callee<'a> {
     name: &'a str,
     /// The object; empty without one.
@@ -622,7 +622,7 @@ fn is_recorder(name: &str, full: &str) -> bool {
 // The types of messages as C++ names them.
 
 /// The alias names in a file.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct Aliases {
     aliases: BTreeMap<String, String>,
     /// Namespaces that are opened by `using namespace`.

@@ -28,7 +28,7 @@ impl Role {
 }
 
 /// The kind of object that a call creates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Made {
     Publisher,
     Subscriber,
@@ -66,7 +66,7 @@ pub(crate) struct Declaration {
 }
 
 /// The code of a class, or of a file outside its classes (its name is empty). In C++ a class may be spread over files.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Class {
     pub(crate) name: String,
     /// The names of its base classes, without namespaces.
@@ -87,7 +87,6 @@ pub(crate) struct Class {
 }
 
 /// The classes of a file, the first one for what is outside of all, and those around the visited element.
-#[derive(Debug)]
 pub(super) struct Classes {
     pub(super) all: Vec<Class>,
     /// The ends of the enclosing classes, with their indices.
@@ -123,7 +122,7 @@ impl Classes {
 }
 
 /// The content of a source file.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Default)]
 pub(crate) struct FileCode {
     /// The code outside classes first.
     pub(crate) classes: Vec<Class>,
@@ -132,7 +131,6 @@ pub(crate) struct FileCode {
 }
 
 /// A call that creates an object: its topic and types as far as known.
-#[derive(Clone, Debug)]
 pub(super) struct Call {
     pub(super) made: Made,
     pub(super) topic: Option<String>,
@@ -267,7 +265,6 @@ pub(super) const LONGEST: usize = 1000;
 pub(super) const DEEPEST: usize = 8;
 
 /// Names with the expressions assigned to them; a name with several has no known value.
-#[derive(Debug)]
 pub(super) struct TextValues<'a> {
     /// The number of expressions that may still be evaluated for their texts.
     work: Cell<usize>,

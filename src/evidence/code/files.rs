@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::base::error::{Error, Result};
 
 /// A file of the workspace.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug)]
 pub(super) struct SourceFile {
     /// The path below the workspace, with slashes.
     pub(super) path: String,

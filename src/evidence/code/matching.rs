@@ -23,7 +23,7 @@ use crate::evidence::observation::{Confidence, Name};
 use crate::evidence::{source_id, source_word};
 
 /// An edge that the code declares for a node of the bag.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(super) struct Match<'a> {
     pub(super) role: Role,
     pub(super) topic: Name,
@@ -42,7 +42,6 @@ pub(super) struct RecordedTopics {
 }
 
 /// The outcome of reading the code.
-#[derive(Debug, Default)]
 pub(crate) struct Outcome {
     /// Notices about the amount read and found.
     pub(crate) notices: Vec<Notice>,
@@ -409,7 +408,7 @@ fn sentence(found: &Match<'_>, words: &BTreeSet<&str>) -> String {
 
 worded! {
     /// The reason why a declaration is not drawn.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
     enum NotDrawn {
         SeveralPlaces = "several declarations match",
         /// The topics of its node have another publisher or match another declaration too, so the node may

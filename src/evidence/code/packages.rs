@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::files::{FileKind, SourceFile, kind};
 
 /// A package, by its `package.xml`.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Default)]
 pub(super) struct Package {
     pub(super) name: String,
     /// The folder below the workspace, with a slash at the end; empty at the top.

@@ -9,7 +9,7 @@ use super::packages::{Package, Program, package_of};
 use crate::evidence::given::launch::LaunchedNode;
 
 /// The content of a workspace.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(super) struct Workspace {
     pub(super) packages: Vec<Package>,
     pub(super) files: Vec<CodeFile>,
@@ -20,7 +20,6 @@ pub(super) struct Workspace {
 }
 
 /// A source file.
-#[derive(Debug)]
 pub(super) struct CodeFile {
     pub(super) path: String,
     pub(super) package: Option<usize>,
@@ -59,7 +58,6 @@ pub(crate) struct Instance {
 }
 
 /// A node in the code.
-#[derive(Clone, Debug)]
 struct CodeNode {
     names: Vec<String>,
     program: (String, String),

@@ -10,7 +10,6 @@ use crate::base::error::{Error, Result};
 const HINT: &str = "save it from rqt_graph with `Save as DOT`";
 
 /// A word of DOT with its line.
-#[derive(Clone, Debug, PartialEq, Eq)]
 struct DotToken {
     line: usize,
     text: String,

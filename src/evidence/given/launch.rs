@@ -33,7 +33,6 @@ const NESTED: usize = 200;
 const ENTRY: usize = 150;
 
 /// A node that a launch file starts.
-#[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct LaunchedNode {
     /// The package of the program.
     pub(crate) package: String,
@@ -72,7 +71,7 @@ impl LaunchedNode {
 const MOST_TOPICS: usize = 1000;
 
 /// The treatment of conditions that cannot be decided statically.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 enum Undecided {
     /// The elements under it are left out with a notice.
     LeftOut,
@@ -81,7 +80,7 @@ enum Undecided {
 }
 
 /// The settings in effect at a point in a file.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Default)]
 struct Scope {
     namespace: String,
     arguments: Rc<BTreeMap<String, String>>,

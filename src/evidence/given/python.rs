@@ -92,7 +92,7 @@ struct Locals {
 }
 
 /// The continuation after a statement.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 enum ControlFlow {
     Next,
     Done,
@@ -710,7 +710,7 @@ impl PythonValue {
 // Calls.
 
 /// The arguments of a call, in order and by name.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct Arguments {
     positional: Vec<PythonValue>,
     named: Vec<(String, PythonValue)>,
@@ -1038,7 +1038,7 @@ fn formatted(format: &str, arguments: &Arguments) -> Option<String> {
 // Values.
 
 /// The value of an expression. Texts may contain launch substitutions `$(…)`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, PartialEq)]
 enum PythonValue {
     /// A value that is only known at run time, with its line.
     Unknown(usize),

@@ -8,7 +8,7 @@ use crate::bag::Connection;
 use crate::base::words::visible;
 
 /// A field of a message.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Field {
     pub(crate) name: String,
     /// The type without array and bounds, as written: `float64`, `Point`, `geometry_msgs/Point`.
@@ -37,7 +37,7 @@ impl fmt::Display for Array {
 }
 
 /// A message: its package, its name without it, its fields.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq, Eq)]
 pub(crate) struct MessageFields {
     pub(super) package: String,
     pub(crate) name: String,
@@ -82,7 +82,7 @@ impl MessageFields {
 }
 
 /// The form of a definition's text, or of one of its sections.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) enum Form {
     #[default]
     Msg,

@@ -6,7 +6,7 @@ use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
 use crate::evidence::message::definition::{self, Form};
 
 /// A part of a message.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub(crate) enum MessageValue {
     Text(String),
     /// An unsigned number of one byte.
@@ -54,7 +54,7 @@ const BUILT_IN: [(&str, &str); 2] = [
 ];
 
 /// A parsed definition.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct MessageSchema(Vec<(String, String)>);
 
 impl MessageSchema {
@@ -229,7 +229,7 @@ pub(crate) struct MessageLayout {
 }
 
 /// The confidence to which a connection fits a layout.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum LayoutFit {
     /// The connection has another type or encoding.
     OtherType,

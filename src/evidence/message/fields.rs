@@ -51,7 +51,7 @@ enum DecodeStep {
 }
 
 /// A parsed definition, ready to decode messages.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub(crate) struct Decoder {
     encoding: Encoding,
     steps: Vec<DecodeStep>,
@@ -462,7 +462,7 @@ fn numbers(
 const HEADERS: &str = "std_msgs";
 
 /// The messages of a type, the outermost first.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone)]
 struct Definition {
     messages: Vec<Arc<MessageFields>>,
     /// The number of messages from the bag's text, which come first: in some old bags it names nested ones without their
@@ -575,7 +575,7 @@ fn is_blank(connection: &Connection) -> bool {
 const BEFORE: &str = " before";
 
 /// The version of the built-in types.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 enum Carried {
     Ros1,
     Ros2,
@@ -584,7 +584,7 @@ enum Carried {
 }
 
 /// Types by package and name, the user's own first.
-#[derive(Clone, Debug, Default)]
+#[derive(Default)]
 pub(crate) struct KnownTypes {
     own: Vec<Arc<MessageFields>>,
 }

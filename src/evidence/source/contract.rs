@@ -44,7 +44,7 @@ pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
 }
 
 /// A row of the table.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone)]
 struct Contract {
     /// The node's own name, without a namespace; empty for any.
     node: String,

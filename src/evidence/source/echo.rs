@@ -112,7 +112,7 @@ fn collect(value: &MessageValue, into: &mut Vec<String>) {
 }
 
 /// The texts of one form, by one node, about one topic.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct Echo {
     values: BTreeSet<Box<str>>,
     texts: BTreeSet<(Stamp, Box<str>)>,

@@ -45,7 +45,7 @@ const LISTS: [&str; 3] = [
 ];
 
 /// The first header in a message, which begins with it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct FirstHeader {
     /// Whether the message begins with a list, whose first element begins with the header.
     is_listed: bool,
@@ -111,7 +111,7 @@ pub(crate) fn collect(context: &mut SourceContext<'_>, header: FirstHeader, firs
 }
 
 /// The equal stamps of two flows.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Default)]
 struct StampPair {
     equal: u64,
     /// The number of times that the input came first, and not long before.
@@ -121,7 +121,6 @@ struct StampPair {
 }
 
 /// Messages of one topic by one publisher, or by all publishers of one role.
-#[derive(Clone, Debug)]
 struct StampFlow {
     topic: Name,
     /// The nodes that send it, if known, and the role they share.

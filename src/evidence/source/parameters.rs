@@ -25,7 +25,7 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2(
 );
 
 /// A parameter that was declared or set.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 pub(crate) struct Parameter<'a> {
     pub(crate) name: &'a str,
     /// The value, if Boolean.
@@ -33,7 +33,6 @@ pub(crate) struct Parameter<'a> {
 }
 
 /// A change of a node's parameters.
-#[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ParameterEvent<'a> {
     /// The node's full name; empty if not stated.
     pub(crate) node: &'a str,

@@ -54,7 +54,7 @@ pub(crate) fn collect(context: &mut SourceContext<'_>, beginning: &[u8], size: u
 type PayloadFlow = (Name, Option<Name>);
 
 /// The equal messages of two flows.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Default)]
 struct PayloadPair {
     /// The number of messages that the input had before the output.
     before: u64,
@@ -62,7 +62,7 @@ struct PayloadPair {
 }
 
 /// Messages of an output in a row that all come from one input, and only from it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Run {
     input: usize,
     first: Stamp,
@@ -70,7 +70,7 @@ struct Run {
 }
 
 /// The result of one pass over all messages.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct Matches {
     pairs: BTreeMap<(usize, usize), PayloadPair>,
     /// By flow: the number of its different messages that were seen before in exactly these other flows.
@@ -178,7 +178,7 @@ fn matches(known: &mut Conclusions<'_>) -> (Vec<PayloadFlow>, Matches) {
 }
 
 /// The pass over all messages.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct PayloadWalk {
     found: Matches,
     /// The contents that each flow had so far.

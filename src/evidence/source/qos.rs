@@ -9,7 +9,7 @@ use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::observation::{Confidence, Observation, SourceId};
 
 /// The quality of service that one publisher offers.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Offer {
     reliability: &'static str,
     durability: &'static str,

@@ -155,7 +155,7 @@ fn live_like(
 // One lifetime of an element: when it begins and ends by the evidence for both.
 
 /// A period of existence, both ends included; it never ends before it begins.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Lifetime {
     from: Stamp,
     to: Stamp,
@@ -310,7 +310,7 @@ fn lives(signs: &[Stamp], ends: &[Stamp]) -> Vec<Lifetime> {
 // messages, ended by evidence of an end.
 
 /// The extent of a lifetime.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Extent {
     /// From its first sign to its last.
     Signs,
@@ -321,7 +321,7 @@ pub(crate) enum Extent {
 }
 
 /// The rhythm of an element's messages in the last stretch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 pub(crate) struct Pulse {
     first: Stamp,
     last: Stamp,
@@ -377,7 +377,6 @@ impl Pulse {
 }
 
 /// The known signs and lifetimes of one element.
-#[derive(Clone, Debug)]
 pub(crate) struct Liveness {
     pub(crate) evidence: Evidence,
     /// The strongest confidence of evidence for it.
@@ -411,7 +410,7 @@ pub(crate) struct Liveness {
 }
 
 /// The messages of an element.
-#[derive(Clone, Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Messages {
     /// Their rhythms.
     pub(crate) pulses: Vec<Pulse>,

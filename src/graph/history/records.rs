@@ -28,7 +28,7 @@ use crate::graph::{
 
 /// The history of a mission: its elements with their lifetimes, and the messages of all senders, in
 /// continuous time.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct History {
     /// All nodes, topics and edges of the mission.
     pub(crate) elements: Elements,
@@ -51,7 +51,7 @@ pub(crate) struct History {
 }
 
 /// A statement about an element other than that it exists.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Incident {
     pub(crate) what: Element,
     pub(crate) kind: IncidentKind,
@@ -61,7 +61,6 @@ pub(crate) struct Incident {
 }
 
 /// The record of one element over the mission.
-#[derive(Clone, Debug)]
 pub(crate) struct Record {
     /// The strongest confidence of evidence for it.
     pub(crate) confidence: Confidence,

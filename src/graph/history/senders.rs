@@ -19,7 +19,6 @@ use crate::graph::history::{LongestPauses, Stretch};
 pub(crate) type Traffic = ById<Name, Senders>;
 
 /// The senders of one topic; empty for other names.
-#[derive(Default)]
 pub(crate) struct Senders {
     /// The indices of the topic's streams, sorted.
     pub(crate) streams: Vec<usize>,
@@ -41,7 +40,6 @@ impl Senders {
 }
 
 /// The messages of one sender on one topic, over all its streams: a split recording has one per part.
-#[derive(Debug)]
 pub(crate) struct Sender {
     /// The node; `None` for all unknown senders together.
     pub(crate) node: Option<Name>,
