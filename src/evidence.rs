@@ -99,18 +99,20 @@ impl Evidence {
 
     /// A description of each kind in the set, in a line of plain words, in the order of [`SOURCES`].
     pub(crate) fn lines(self) -> impl Iterator<Item = String> {
-        let rows = SOURCES.iter().enumerate();
-        let rows = rows.filter(move |(at, _)| self.0 >> at & 1 == 1);
-        rows.map(|(_, source)| format!("{}: {}", source.word, source.about.replace('`', "")))
+        let line = |source: &Source| format!("{}: {}", source.word, source.about.replace('`', ""));
+        self.rows().map(line)
     }
 
     /// The words of the set, in the order of [`SOURCES`].
     pub fn words(self) -> impl Iterator<Item = &'static str> {
-        SOURCES
-            .iter()
-            .enumerate()
-            .filter(move |(at, _)| self.0 >> at & 1 == 1)
-            .map(|(_, source)| source.word)
+        self.rows().map(|source| source.word)
+    }
+
+    /// The rows of the set.
+    fn rows(self) -> impl Iterator<Item = &'static Source> {
+        let rows = SOURCES.iter().enumerate();
+        let rows = rows.filter(move |(at, _)| self.0 >> at & 1 == 1);
+        rows.map(|(_, source)| source)
     }
 }
 

@@ -226,51 +226,7 @@ impl Collector {
         if let Some(Some(numbers)) = self.numbers.get_mut(place) {
             numbers.add(message.time, message.data);
         }
-        let stream = &self.streams[place];
-        if let Some(header) = self.layouts[place].header
-            && self.options.infer_stamps
-        {
-            let mut context = SourceContext {
-                facts: &mut self.facts,
-                space: &self.space,
-                stream,
-                place,
-                source: 0,
-                time: Some(message.time),
-            };
-            equal_stamps::collect(&mut context, header, message.data);
-        }
-        self.compare(place, message);
-        let stream = &self.streams[place];
         let layout = &self.layouts[place];
-        for (source, read) in &layout.readers {
-            let mut context = SourceContext {
-                facts: &mut self.facts,
-                space: &self.space,
-                stream,
-                place,
-                source: *source,
-                time: Some(message.time),
-            };
-            let done = PayloadCursor::new(&stream.connection.encoding, message.data)
-                .map(|payload| payload.numbered(layout.is_numbered))
-                .and_then(|mut payload| read.read(&mut context, &mut payload));
-            if done.is_err() {
-                self.notices
-                    .add(undecodable(stream, "some messages do not have its layout"));
-            }
-        }
-    }
-
-    /// Keeps the content of a payload for comparisons, as long as the budget lasts.
-    fn compare(&mut self, place: usize, message: &Message<'_>) {
-        let beginning = message.data.get(..payload::HEAD).unwrap_or(message.data);
-        self.compared = self
-            .compared
-            .saturating_add(beginning.len() as u64 + PAYLOAD_ENTRY);
-        if self.compared > self.options.payload_bytes {
-            return;
-        }
         let mut context = SourceContext {
             facts: &mut self.facts,
             space: &self.space,
@@ -279,22 +235,38 @@ impl Collector {
             source: 0,
             time: Some(message.time),
         };
-        // The number in the header is set by the publisher, even in a copy.
-        let own = if self.numbers.some(place).is_some() {
-            4
-        } else {
-            0
-        };
-        let compared = beginning.get(own..).unwrap_or_default();
-        payload::collect(&mut context, compared, message.size);
-        let layout = &self.layouts[place];
-        if let Some(header) = layout.header {
-            equal_stamps::age(&mut context, header, beginning);
-        }
-        if let Some(schema) = &layout.schema
-            && beginning.len() == message.size as usize
+        if let Some(header) = layout.header
+            && self.options.infer_stamps
         {
-            echo::keep(&mut context, schema, beginning);
+            equal_stamps::collect(&mut context, header, message.data);
+        }
+        // Payloads are compared as long as the budget lasts.
+        let beginning = message.data.get(..payload::HEAD).unwrap_or(message.data);
+        let cost = beginning.len() as u64 + PAYLOAD_ENTRY;
+        self.compared = self.compared.saturating_add(cost);
+        if self.compared <= self.options.payload_bytes {
+            // The number in the header is set by the publisher, even in a copy.
+            let is_numbered = self.numbers.some(place).is_some();
+            let own = beginning.get(if is_numbered { 4 } else { 0 }..);
+            payload::collect(&mut context, own.unwrap_or_default(), message.size);
+            if let Some(header) = layout.header {
+                equal_stamps::age(&mut context, header, beginning);
+            }
+            if let Some(schema) = &layout.schema
+                && beginning.len() == message.size as usize
+            {
+                echo::keep(&mut context, schema, beginning);
+            }
+        }
+        for (source, read) in &layout.readers {
+            context.source = *source;
+            let done = PayloadCursor::new(&context.stream.connection.encoding, message.data)
+                .map(|payload| payload.numbered(layout.is_numbered))
+                .and_then(|mut payload| read.read(&mut context, &mut payload));
+            if done.is_err() {
+                let why = "some messages do not have its layout";
+                self.notices.add(undecodable(context.stream, why));
+            }
         }
     }
 

@@ -491,7 +491,6 @@ impl Conclusions<'_> {
     /// and subscriptions.
     pub(crate) fn take_at_their_word(&mut self) {
         let endings = self.endings();
-        let refusals = self.refusals();
         let facts = self.facts.list.iter();
         let records = facts.filter_map(|fact| match fact.observation {
             Observation::Node(node) => {
@@ -511,7 +510,8 @@ impl Conclusions<'_> {
                 _ => continue,
             };
             let (mut signs, ends) = self.signs_and_ends(&fact, &endings);
-            if let (Observation::Joins(..), Some(refused)) = (fact.observation, refusals.get(&what))
+            if let Observation::Joins(node, topic) = fact.observation
+                && let Some(refused) = endings.get(&Observation::Refused(node, topic))
             {
                 signs.retain(|sign| !is_refused(*sign, refused));
             }
@@ -534,25 +534,13 @@ impl Conclusions<'_> {
         }
     }
 
-    /// The times at which subscriptions were refused.
-    fn refusals(&mut self) -> BTreeMap<ElementKey, Vec<Stamp>> {
-        let mut refusals: BTreeMap<ElementKey, Vec<Stamp>> = BTreeMap::new();
-        for fact in self.facts.list.clone() {
-            if let Observation::Refused(node, topic) = fact.observation {
-                let times = self.times(&fact);
-                let key = ElementKey::Subscribe(topic, node);
-                refusals.entry(key).or_default().extend(times);
-            }
-        }
-        refusals
-    }
-
-    /// The times at which observations were revoked, and those of snapshots.
+    /// The times at which observations were revoked, those of refusals and those of snapshots, sorted.
     fn endings(&mut self) -> BTreeMap<Observation, Vec<Stamp>> {
         let mut endings: BTreeMap<Observation, Vec<Stamp>> = BTreeMap::new();
         for fact in self.facts.list.clone() {
             if let Observation::NodeGone(_)
             | Observation::Unsubscribe(..)
+            | Observation::Refused(..)
             | Observation::Snapshot(_) = fact.observation
             {
                 let times = self.times(&fact);

@@ -6,7 +6,7 @@ use std::cmp::Reverse;
 use std::collections::binary_heap::PeekMut;
 use std::collections::{BTreeMap, BinaryHeap};
 use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use tempfile::SpooledTempFile;
 
@@ -93,28 +93,52 @@ impl OpenSeries {
 }
 
 /// Any number of sequences of times, each message with its size if known.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Stamps {
     series: ById<SeriesId, OpenSeries>,
-    /// The temporary file; locked because reading moves its position.
-    spool: Mutex<SpooledTempFile>,
-    written: u64,
+    spool: Spool,
     open: usize,
     /// The messages of each bag by day.
     calendars: ById<usize, Calendar>,
     failed: Option<io::Error>,
 }
 
-impl Default for Stamps {
+/// The temporary file of encoded blocks, and the number of bytes written to it.
+#[derive(Debug)]
+struct Spool {
+    /// Locked because reading moves its position.
+    file: Mutex<SpooledTempFile>,
+    written: u64,
+}
+
+impl Default for Spool {
     fn default() -> Self {
         Self {
-            series: ById::default(),
-            spool: Mutex::new(SpooledTempFile::new(IN_MEMORY)),
+            file: Mutex::new(SpooledTempFile::new(IN_MEMORY)),
             written: 0,
-            open: 0,
-            calendars: ById::default(),
-            failed: None,
         }
+    }
+}
+
+impl Spool {
+    /// Adds bytes; returns their position.
+    fn append(&mut self, bytes: &[u8]) -> io::Result<u64> {
+        let at = self.written;
+        let file = self.file.get_mut();
+        let file = file.unwrap_or_else(PoisonError::into_inner);
+        file.seek(SeekFrom::Start(at))?;
+        file.write_all(bytes)?;
+        self.written += bytes.len() as u64;
+        Ok(at)
+    }
+
+    /// The bytes of a block.
+    fn bytes(&self, block: &StampBlock) -> io::Result<Vec<u8>> {
+        let mut bytes = vec![0; block.bytes as usize];
+        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        file.seek(SeekFrom::Start(block.at))?;
+        file.read_exact(&mut bytes)?;
+        Ok(bytes)
     }
 }
 
@@ -145,9 +169,7 @@ impl Stamps {
             series.open.push((*stamp, size));
             if series.open.len() == BLOCK {
                 self.open = self.open.saturating_sub(BLOCK - 1);
-                let spool = self.spool.get_mut();
-                let spool = spool.unwrap_or_else(PoisonError::into_inner);
-                close(series, spool, &mut self.written, &mut self.calendars)
+                close(series, &mut self.spool, &mut self.calendars)
                     .unwrap_or_else(|e| self.failed = Some(e));
             } else {
                 self.open += 1;
@@ -161,10 +183,8 @@ impl Stamps {
 
     /// Encodes all open stamps as blocks.
     fn close_all(&mut self) {
-        let spool = self.spool.get_mut();
-        let spool = spool.unwrap_or_else(PoisonError::into_inner);
         for series in self.series.iter_mut() {
-            close(series, spool, &mut self.written, &mut self.calendars)
+            close(series, &mut self.spool, &mut self.calendars)
                 .unwrap_or_else(|e| self.failed = Some(e));
         }
         self.open = 0;
@@ -193,17 +213,12 @@ impl Stamps {
             series.count = series.open.len() as u64;
             new.open += series.open.len();
             for block in old.blocks.iter().filter(|block| block.last >= from) {
-                let bytes = self.bytes(block)?;
-                let spool = new.spool.get_mut();
-                let spool = spool.unwrap_or_else(PoisonError::into_inner);
-                spool.seek(SeekFrom::Start(new.written))?;
-                spool.write_all(&bytes)?;
+                let at = new.spool.append(&self.spool.bytes(block)?)?;
                 series.hold(StampBlock {
-                    at: new.written,
+                    at,
                     ..block.clone()
                 });
                 series.count += u64::from(block.count);
-                new.written += bytes.len() as u64;
             }
             new.series.push(series);
         }
@@ -328,11 +343,9 @@ impl Stamps {
             size_unknown: !sized,
             ..OpenSeries::default()
         };
-        let spool = self.spool.get_mut();
-        let spool = spool.unwrap_or_else(PoisonError::into_inner);
         for block in times.chunks(BLOCK) {
             series.open = block.to_vec();
-            close(series, spool, &mut self.written, &mut ById::default())?;
+            close(series, &mut self.spool, &mut ById::default())?;
         }
         series.open = Vec::new();
         Ok(())
@@ -342,29 +355,16 @@ impl Stamps {
         self.series.get(id)
     }
 
-    fn spool(&self) -> MutexGuard<'_, SpooledTempFile> {
-        self.spool.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     fn load(&self, block: &StampBlock) -> io::Result<Vec<(Stamp, u32)>> {
-        let bytes = self.bytes(block)?;
+        let bytes = self.spool.bytes(block)?;
         Ok(decode(&bytes, block.count as usize))
-    }
-
-    fn bytes(&self, block: &StampBlock) -> io::Result<Vec<u8>> {
-        let mut bytes = vec![0; block.bytes as usize];
-        let mut spool = self.spool();
-        spool.seek(SeekFrom::Start(block.at))?;
-        spool.read_exact(&mut bytes)?;
-        Ok(bytes)
     }
 }
 
 /// Sorts and writes the open stamps of a series.
 fn close(
     series: &mut OpenSeries,
-    spool: &mut SpooledTempFile,
-    written: &mut u64,
+    spool: &mut Spool,
     calendars: &mut ById<usize, Calendar>,
 ) -> io::Result<()> {
     let mut open = std::mem::take(&mut series.open);
@@ -380,13 +380,10 @@ fn close(
     series.hold(StampBlock {
         first,
         last,
-        at: *written,
+        at: spool.append(&bytes)?,
         bytes: u32::try_from(bytes.len()).unwrap_or(u32::MAX),
         count: u32::try_from(open.len()).unwrap_or(u32::MAX),
     });
-    spool.seek(SeekFrom::Start(*written))?;
-    spool.write_all(&bytes)?;
-    *written += bytes.len() as u64;
     open.clear();
     series.open = open;
     Ok(())
@@ -634,7 +631,8 @@ mod tests {
             all.add(*id, &[Stamp(n << 42)], None);
         }
         all.finish().unwrap();
-        assert!(all.spool().is_rolled() || all.written <= IN_MEMORY as u64);
+        let is_rolled = all.spool.file.get_mut().unwrap().is_rolled();
+        assert!(is_rolled || all.spool.written <= IN_MEMORY as u64);
         let mut next = 0;
         all.merge(&ids, |t| {
             assert_eq!(t.time, Stamp(next << 42));

@@ -15,7 +15,7 @@ use crate::base::name::{is_player, is_recorder, last_part, namespace};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words::{count, some_of, worded};
 use crate::evidence::code::Code;
-use crate::evidence::code::declaration::{Role, type_key};
+use crate::evidence::code::declaration::{Declaration, Role, type_key};
 use crate::evidence::code::workspace::{FileDeclaration, Instance};
 use crate::evidence::given::launch::join;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
@@ -178,11 +178,7 @@ fn summary(
 fn remarks_on(instance: &Instance, node: &str, recorded: &RecordedTopics) -> Vec<String> {
     let remark = |placed: &FileDeclaration| {
         let declaration = &placed.declaration;
-        let name = remapped(
-            &resolved(node, declaration.topic.as_ref()?),
-            node,
-            &instance.remaps,
-        );
+        let name = named_topic(instance, node, declaration)?;
         let place = format!("{}:{}", placed.path, declaration.line);
         let types = declaration.types.join(" or ");
         match recorded.topics.get(&name) {
@@ -238,9 +234,7 @@ impl RecordedTopics {
     pub(super) fn contradicts(&self, instance: &Instance, node: &str) -> bool {
         instance.declared.iter().any(|placed| {
             let declaration = &placed.declaration;
-            let written = declaration.topic.as_ref();
-            let name =
-                written.map(|topic| remapped(&resolved(node, topic), node, &instance.remaps));
+            let name = named_topic(instance, node, declaration);
             let recorded = name.and_then(|name| self.topics.get(&name));
             let is_known = !declaration.types.is_empty();
             is_known
@@ -322,10 +316,9 @@ pub(super) fn matches<'a>(
 ) -> Vec<Match<'a>> {
     let mut found: Vec<Match<'a>> = Vec::new();
     for placed in instance.declared.iter() {
-        let Some(written) = &placed.declaration.topic else {
+        let Some(name) = named_topic(instance, node, &placed.declaration) else {
             continue;
         };
-        let name = remapped(&resolved(node, written), node, &instance.remaps);
         let role = placed.declaration.role;
         if let Some(topic) = recorded.topic(&name, &placed.declaration.types)
             && !found.iter().any(|m| (m.role, m.topic) == (role, topic))
@@ -352,12 +345,12 @@ pub(super) fn resolved(node: &str, topic: &str) -> String {
     format!("/{}", parts.join("/"))
 }
 
-fn remapped(topic: &str, node: &str, remaps: &[(String, String)]) -> String {
-    let found = remaps
-        .iter()
-        .rev()
-        .find(|(from, _)| resolved(node, from) == topic);
-    found.map_or_else(|| topic.to_owned(), |(_, to)| resolved(node, to))
+/// The name of a declared topic after the remaps, if the instance ran as this node; `None` if the code does not show it.
+fn named_topic(instance: &Instance, node: &str, declaration: &Declaration) -> Option<String> {
+    let topic = resolved(node, declaration.topic.as_ref()?);
+    let mut remaps = instance.remaps.iter().rev();
+    let remap = remaps.find(|(from, _)| resolved(node, from) == topic);
+    Some(remap.map_or(topic, |(_, to)| resolved(node, to)))
 }
 
 /// Adds an edge unless the bag already contains or contradicts it; returns whether it was added.

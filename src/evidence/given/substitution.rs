@@ -110,7 +110,7 @@ fn unquoted(text: &str) -> &str {
 }
 
 /// The position of the parenthesis that closes the one at the start.
-fn closing(text: &str) -> Option<usize> {
+pub(crate) fn closing(text: &str) -> Option<usize> {
     let mut open = 1_usize;
     text.char_indices().find_map(|(at, c)| {
         match c {

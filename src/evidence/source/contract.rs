@@ -12,7 +12,7 @@ use std::sync::Arc;
 use super::SourceContext;
 use crate::base::csv;
 use crate::base::ids::ById;
-use crate::base::name::{last_part, namespace};
+use crate::base::name::{last_part, resolved};
 use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Name, Observation, SourceId};
@@ -236,21 +236,6 @@ fn is_meant(contract: &Contract, node: &str, files: Option<&BTreeSet<Arc<str>>>)
     } else {
         last_part(node) == contract.node && files.is_none_or(own)
     }
-}
-
-/// A topic's full name in the default configuration of a node.
-fn resolved(topic: &str, node: &str) -> String {
-    let space = namespace(node);
-    if let Some(private) = topic.strip_prefix("~/") {
-        return format!("{node}/{private}");
-    }
-    if let Some(outer) = topic.strip_prefix("../") {
-        return format!("{}/{outer}", namespace(space).trim_end_matches('/'));
-    }
-    if topic.starts_with('/') {
-        return topic.to_owned();
-    }
-    format!("{}/{topic}", space.trim_end_matches('/'))
 }
 
 #[cfg(test)]

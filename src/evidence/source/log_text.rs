@@ -2,6 +2,7 @@
 //! incompatible quality of service, of Gazebo's plugins, its bridge and rosserial about their endpoints), of two nodes of one name,
 //! and of roscpp about its connections.
 
+use crate::base::name::resolved;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind, Inference, Validity};
 use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Confidence, Observation, SourceId};
@@ -154,16 +155,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
-/// A topic's full name, from the form in a node's log text.
-fn resolved(topic: &str, node: &str) -> String {
-    let space = node.rsplit_once('/').map_or("", |(space, _)| space);
-    match topic.strip_prefix('~') {
-        Some(private) => format!("{node}/{}", private.trim_start_matches('/')),
-        None if topic.starts_with('/') => topic.to_owned(),
-        None => format!("{space}/{topic}"),
-    }
-}
-
+// A topic's full name, from the form in a node's log text.
 // Two nodes of one name: rcl, where both log over one publisher, and the master of ROS 1, which ends the older one.
 
 pub(crate) fn read_duplicates(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {

@@ -336,8 +336,7 @@ impl Assembly<'_> {
         *all.topic_ids.grown(name) = Some(id);
         let pauses = traffic.map(|of| of.pauses.clone());
         all.sending.pauses.push(pauses.unwrap_or_default());
-        let record = Record::new(track, self.findings.mission, silent);
-        all.records.push(Element::Topic(id), record);
+        self.keep(Element::Topic(id), track, silent);
     }
 
     /// The number of publishers of a topic that the bag counts beyond the known ones.
@@ -354,20 +353,22 @@ impl Assembly<'_> {
         let senders = self.traffic.get(topic).map(|of| &of.list);
         let sender = senders.and_then(|all| all.iter().find(|s| s.node == Some(node)));
         let silent = self.silences(sender.into_iter(), &spans(track));
-        let all = &mut self.history;
-        let id = all.elements.publishes.push(edge);
-        let record = Record::new(track, self.findings.mission, silent);
-        all.records.push(Element::Publish(id), record);
+        let id = self.history.elements.publishes.push(edge);
+        self.keep(Element::Publish(id), track, silent);
     }
 
     fn subscribe(&mut self, topic: Name, node: Name, track: &Liveness) {
         let Some(edge) = self.edge(node, topic, track) else {
             return;
         };
-        let all = &mut self.history;
-        let id = all.elements.subscribes.push(edge);
-        let record = Record::new(track, self.findings.mission, Vec::new());
-        all.records.push(Element::Subscribe(id), record);
+        let id = self.history.elements.subscribes.push(edge);
+        self.keep(Element::Subscribe(id), track, Vec::new());
+    }
+
+    /// Adds the record of the newest element of a kind.
+    fn keep(&mut self, what: Element, track: &Liveness, silent: Vec<(Stamp, Option<Stamp>)>) {
+        let record = Record::new(track, self.findings.mission, silent);
+        self.history.records.push(what, record);
     }
 
     /// An edge between elements that were added before; `None` if one of them was not.
