@@ -200,12 +200,8 @@ fn recorded(path: &Path) -> Result<Topology> {
         .collect();
     if entries.is_empty() {
         let hint = "give a recording of `/rosgraph` or of `/nodl/observed_node`";
-        return Err(Error::bad_file(
-            path,
-            0,
-            "it contains no recorded graph",
-            hint,
-        ));
+        let reason = "it contains no recorded graph";
+        return Err(Error::bad_file(path, 0, reason, hint));
     }
     entries.sort();
     entries.dedup();

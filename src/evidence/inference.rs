@@ -411,11 +411,8 @@ impl<'a> Conclusions<'a> {
         basis: Name,
         topic: Name,
     ) {
-        self.like(
-            source,
-            ElementKey::Subscribe(topic, node),
-            ElementKey::Publish(node, basis),
-        );
+        let basis = ElementKey::Publish(node, basis);
+        self.like(source, ElementKey::Subscribe(topic, node), basis);
     }
 
     /// The names of all known nodes and loggers.

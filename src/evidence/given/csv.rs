@@ -47,10 +47,8 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
         if let (Some(from), Some(to)) = (from_ns, to_ns)
             && to < from
         {
-            return Err(wrong(
-                line,
-                format!("the end {end} is before the start {start}"),
-            ));
+            let reason = format!("the end {end} is before the start {start}");
+            return Err(wrong(line, reason));
         }
         let mut add = |element| {
             topology.entries.push(TopologyEntry {

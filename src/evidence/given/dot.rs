@@ -116,12 +116,8 @@ fn statements(tokens: &[DotToken]) -> Statements {
             things.entry(id.clone()).or_insert((token.line, thing));
         }
         for pair in chain.windows(2) {
-            edges.push((
-                token.line,
-                pair[0].clone(),
-                pair[1].clone(),
-                attributes.clone(),
-            ));
+            let [from, to] = [0, 1].map(|at| pair[at].clone());
+            edges.push((token.line, from, to, attributes.clone()));
         }
     }
     (things, edges)

@@ -334,19 +334,13 @@ impl Launch {
             return Ok(());
         };
         let Some(found) = located(path, &file) else {
-            self.left_out(
-                path,
-                tree,
-                &format!("the included file `{file}` was not found"),
-            );
+            let why = format!("the included file `{file}` was not found");
+            self.left_out(path, tree, &why);
             return Ok(());
         };
         if self.stack.contains(&found) || self.stack.len() > DEEPEST {
-            self.left_out(
-                path,
-                tree,
-                &format!("the included file `{file}` includes itself"),
-            );
+            let why = format!("the included file `{file}` includes itself");
+            self.left_out(path, tree, &why);
             return Ok(());
         }
         let text = super::text(&found)?;

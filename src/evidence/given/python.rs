@@ -15,6 +15,8 @@ use crate::evidence::given::substitution::LONGEST;
 use crate::evidence::given::tree::Tree;
 use crate::evidence::syntax::{Language, Node, Parsed, children, line};
 
+use PythonValue::{Bool, Dict, Function, List, Number, Text, Unknown};
+
 /// The tag of an element that is only known at run time.
 pub(super) const UNREAD: &str = "unread";
 
@@ -43,11 +45,11 @@ pub(super) fn of_python(path: &Path, text: &str) -> Result<Tree> {
 pub(super) fn evaluate(expression: &str, names: &BTreeMap<String, String>) -> Option<String> {
     match value(expression, names)? {
         // XML puts quotes around the whole expression.
-        PythonValue::Text(text) => match value(&text, names) {
-            Some(PythonValue::Bool(is_true)) => Some(word(is_true)),
+        Text(text) => match value(&text, names) {
+            Some(Bool(is_true)) => Some(word(is_true)),
             _ => Some(text).filter(|text| !text.contains("$(")),
         },
-        PythonValue::Bool(is_true) => Some(word(is_true)),
+        Bool(is_true) => Some(word(is_true)),
         other => other.text(),
     }
 }
@@ -58,6 +60,11 @@ fn value(expression: &str, names: &BTreeMap<String, String>) -> Option<PythonVal
         .iter()
         .map(|(name, text)| (name.clone(), of_text(text)));
     Evaluator::new(&parsed, texts.collect()).whole()
+}
+
+/// A value that is only known at run time.
+fn unknown(at: Node<'_>) -> PythonValue {
+    Unknown(line(at))
 }
 
 fn word(is_true: bool) -> String {
@@ -128,7 +135,7 @@ impl<'a> Evaluator<'a> {
         if self.parsed.root().has_error() || statement.len() != 1 {
             return None;
         }
-        Some(self.value(expression)).filter(|value| !matches!(value, PythonValue::Unknown(_)))
+        Some(self.value(expression)).filter(|value| !matches!(value, Unknown(_)))
     }
 
     fn text(&self, node: Node<'_>) -> &'a str {
@@ -138,11 +145,10 @@ impl<'a> Evaluator<'a> {
     /// Returns a new value, or unknown if it is too large, too deep or exceeds the budget.
     fn kept(&mut self, value: PythonValue, at: Node<'_>) -> PythonValue {
         let (size, depth) = value.measure();
-        let is_small =
-            depth <= DEEPEST && !matches!(&value, PythonValue::Text(text) if text.len() > LONGEST);
+        let is_small = depth <= DEEPEST && !matches!(&value, Text(text) if text.len() > LONGEST);
         match self.budget.spend(size) {
             Some(()) if is_small => value,
-            _ => PythonValue::Unknown(line(at)),
+            _ => unknown(at),
         }
     }
 
@@ -201,14 +207,12 @@ impl<'a> Evaluator<'a> {
         let is_sure = undecided == frame.undecided;
         frame.returned = Some(match (frame.returned.take(), value) {
             (None, value) if is_sure || value.acts() => value,
-            (Some(PythonValue::List(mut before)), after) if after.acts() => {
+            (Some(List(mut before)), after) if after.acts() => {
                 before.push(after);
-                PythonValue::List(before)
+                List(before)
             }
-            (Some(before), after) if before.acts() && after.acts() => {
-                PythonValue::List(vec![before, after])
-            }
-            _ => PythonValue::Unknown(line(node)),
+            (Some(before), after) if before.acts() && after.acts() => List(vec![before, after]),
+            _ => unknown(node),
         });
         if is_sure {
             ControlFlow::Done
@@ -263,12 +267,9 @@ impl<'a> Evaluator<'a> {
     /// The items of a loop, as far as known.
     fn items(&mut self, node: Node<'a>) -> Vec<PythonValue> {
         match self.value(node) {
-            PythonValue::List(list) => list,
-            PythonValue::Dict(map) => map
-                .into_iter()
-                .map(|(key, _)| PythonValue::Text(key))
-                .collect(),
-            _ => vec![PythonValue::Unknown(line(node))],
+            List(list) => list,
+            Dict(map) => map.into_iter().map(|(key, _)| Text(key)).collect(),
+            _ => vec![unknown(node)],
         }
     }
 
@@ -303,20 +304,20 @@ impl<'a> Evaluator<'a> {
                 let value = if sure || value.acts() {
                     value
                 } else {
-                    PythonValue::Unknown(line(target))
+                    unknown(target)
                 };
                 if let Some(frame) = self.frames.last_mut() {
                     frame.names.insert(name, value);
                 }
             }
-            ("pattern_list" | "tuple_pattern", PythonValue::List(parts)) => {
+            ("pattern_list" | "tuple_pattern", List(parts)) => {
                 for (target, part) in children(target).into_iter().zip(parts) {
                     self.assign(target, part);
                 }
             }
             ("pattern_list" | "tuple_pattern", _) => {
                 for target in children(target) {
-                    self.assign(target, PythonValue::Unknown(line(target)));
+                    self.assign(target, unknown(target));
                 }
             }
             ("subscript", value) => self.put(target, value),
@@ -331,7 +332,7 @@ impl<'a> Evaluator<'a> {
             return;
         };
         let key = self.value(key).text();
-        if let (Some(PythonValue::Dict(entries)), Some(key)) = (self.variable(map), key) {
+        if let (Some(Dict(entries)), Some(key)) = (self.variable(map), key) {
             entries.retain(|(known, _)| *known != key);
             entries.push((key, value));
         }
@@ -359,10 +360,10 @@ impl<'a> Evaluator<'a> {
                 let value = value.clone();
                 self.kept(value, node)
             }
-            None if self.functions.contains_key(name) => PythonValue::Function(name.to_owned()),
-            None if name == "true" => PythonValue::Bool(true),
-            None if name == "false" => PythonValue::Bool(false),
-            None => PythonValue::Unknown(line(node)),
+            None if self.functions.contains_key(name) => Function(name.to_owned()),
+            None if name == "true" => Bool(true),
+            None if name == "false" => Bool(false),
+            None => unknown(node),
         }
     }
 
@@ -380,10 +381,10 @@ impl<'a> Evaluator<'a> {
     ) -> PythonValue {
         let parts = ["parameters", "body"].map(|name| function.child_by_field_name(name));
         let [Some(parameters), Some(body)] = parts else {
-            return PythonValue::Unknown(line(function));
+            return unknown(function);
         };
         if self.nested > NESTED {
-            return PythonValue::Unknown(line(function));
+            return unknown(function);
         }
         let mut frame = Locals {
             undecided: self.undecided,
@@ -403,7 +404,7 @@ impl<'a> Evaluator<'a> {
             let value = given.or_else(|| default.map(|d| self.value(d)));
             frame
                 .names
-                .insert(name, value.unwrap_or(PythonValue::Unknown(line(parameter))));
+                .insert(name, value.unwrap_or(unknown(parameter)));
         }
         self.frames.push(frame);
         self.nested += 1;
@@ -416,7 +417,7 @@ impl<'a> Evaluator<'a> {
     /// The value of an expression.
     fn value(&mut self, node: Node<'a>) -> PythonValue {
         if self.nested > NESTED || self.budget.spend(STEP).is_none() {
-            return PythonValue::Unknown(line(node));
+            return unknown(node);
         }
         self.nested += 1;
         let value = self.expression(node);
@@ -429,14 +430,14 @@ impl<'a> Evaluator<'a> {
 
 impl<'a> Evaluator<'a> {
     fn expression(&mut self, node: Node<'a>) -> PythonValue {
-        let unknown = PythonValue::Unknown(line(node));
+        let unknown = Unknown(line(node));
         let field = |name| node.child_by_field_name(name);
         match node.kind() {
             "string" | "concatenated_string" => self.string(node),
-            "integer" => self.text(node).parse().map_or(unknown, PythonValue::Number),
-            "float" => PythonValue::Text(self.text(node).to_owned()),
-            "true" => PythonValue::Bool(true),
-            "false" => PythonValue::Bool(false),
+            "integer" => self.text(node).parse().map_or(unknown, Number),
+            "float" => Text(self.text(node).to_owned()),
+            "true" => Bool(true),
+            "false" => Bool(false),
             "none" => PythonValue::None,
             "identifier" => self.constant(node),
             "parenthesized_expression" | "await" => {
@@ -460,8 +461,8 @@ impl<'a> Evaluator<'a> {
 
     fn constant(&mut self, node: Node<'a>) -> PythonValue {
         match self.text(node) {
-            "__file__" => PythonValue::Text("$(dirname)/launch.py".to_owned()),
-            "__name__" => PythonValue::Text("launch".to_owned()),
+            "__file__" => Text("$(dirname)/launch.py".to_owned()),
+            "__name__" => Text("launch".to_owned()),
             _ => self.named(node),
         }
     }
@@ -482,7 +483,7 @@ impl<'a> Evaluator<'a> {
                 _ => {}
             }
         }
-        self.kept(PythonValue::Text(text), node)
+        self.kept(Text(text), node)
     }
 
     fn list(&mut self, node: Node<'a>) -> PythonValue {
@@ -493,7 +494,7 @@ impl<'a> Evaluator<'a> {
                 _ => list.push(self.value(part)),
             }
         }
-        self.kept(PythonValue::List(list), node)
+        self.kept(List(list), node)
     }
 
     fn dictionary(&mut self, node: Node<'a>) -> PythonValue {
@@ -505,30 +506,30 @@ impl<'a> Evaluator<'a> {
                 map.push((key.launch_text(), value));
             }
         }
-        self.kept(PythonValue::Dict(map), node)
+        self.kept(Dict(map), node)
     }
 
     fn comprehension(&mut self, node: Node<'a>) -> PythonValue {
         let parts = children(node);
         let [body, clause, ..] = parts[..] else {
-            return PythonValue::Unknown(line(node));
+            return unknown(node);
         };
         let sides = ["left", "right"].map(|name| clause.child_by_field_name(name));
         let ([Some(left), Some(right)], 2) = (sides, parts.len()) else {
-            return PythonValue::Unknown(line(node));
+            return unknown(node);
         };
         let mut list = Vec::new();
         for item in self.items(right) {
             self.assign(left, item);
             list.push(self.value(body));
         }
-        self.kept(PythonValue::List(list), node)
+        self.kept(List(list), node)
     }
 
     fn binary(&mut self, node: Node<'a>) -> PythonValue {
         let fields = ["left", "operator", "right"].map(|name| node.child_by_field_name(name));
         let [Some(left), Some(operator), Some(right)] = fields else {
-            return PythonValue::Unknown(line(node));
+            return unknown(node);
         };
         let (left, right) = (self.value(left), self.value(right));
         match self.text(operator) {
@@ -536,41 +537,31 @@ impl<'a> Evaluator<'a> {
             "%" => self.formatted(&left, &right, node),
             // `Path(…) / 'x'`
             "/" => self.kept(
-                PythonValue::Text(format!("{}/{}", left.launch_text(), right.launch_text())),
+                Text(format!("{}/{}", left.launch_text(), right.launch_text())),
                 node,
             ),
             sign => match (sign, left, right) {
-                ("-", PythonValue::Number(a), PythonValue::Number(b)) => a
-                    .checked_sub(b)
-                    .map_or(PythonValue::Unknown(line(node)), PythonValue::Number),
-                ("*", PythonValue::Number(a), PythonValue::Number(b)) => a
-                    .checked_mul(b)
-                    .map_or(PythonValue::Unknown(line(node)), PythonValue::Number),
-                _ => PythonValue::Unknown(line(node)),
+                ("-", Number(a), Number(b)) => a.checked_sub(b).map_or(unknown(node), Number),
+                ("*", Number(a), Number(b)) => a.checked_mul(b).map_or(unknown(node), Number),
+                _ => unknown(node),
             },
         }
     }
 
     fn sum(&mut self, left: PythonValue, right: PythonValue, at: Node<'a>) -> PythonValue {
         let sum = match (left, right) {
-            (PythonValue::Number(a), PythonValue::Number(b)) => a
-                .checked_add(b)
-                .map_or(PythonValue::Unknown(line(at)), PythonValue::Number),
-            (PythonValue::List(mut a), PythonValue::List(b)) => {
+            (Number(a), Number(b)) => a.checked_add(b).map_or(unknown(at), Number),
+            (List(mut a), List(b)) => {
                 a.extend(b);
-                PythonValue::List(a)
+                List(a)
             }
-            (PythonValue::List(mut a), unknown @ PythonValue::Unknown(_)) => {
+            (List(mut a), unknown @ Unknown(_)) => {
                 a.push(unknown);
-                PythonValue::List(a)
+                List(a)
             }
-            (PythonValue::Text(a), b @ (PythonValue::Text(_) | PythonValue::Unknown(_))) => {
-                PythonValue::Text(a + &b.launch_text())
-            }
-            (a @ PythonValue::Unknown(_), PythonValue::Text(b)) => {
-                PythonValue::Text(a.launch_text() + &b)
-            }
-            _ => PythonValue::Unknown(line(at)),
+            (Text(a), b @ (Text(_) | Unknown(_))) => Text(a + &b.launch_text()),
+            (a @ Unknown(_), Text(b)) => Text(a.launch_text() + &b),
+            _ => unknown(at),
         };
         self.kept(sum, at)
     }
@@ -582,12 +573,12 @@ impl<'a> Evaluator<'a> {
         values: &PythonValue,
         at: Node<'a>,
     ) -> PythonValue {
-        let PythonValue::Text(format) = format else {
-            return PythonValue::Unknown(line(at));
+        let Text(format) = format else {
+            return unknown(at);
         };
         let one = std::slice::from_ref(values);
         let mut values = match values {
-            PythonValue::List(list) => list.iter(),
+            List(list) => list.iter(),
             _ => one.iter(),
         };
         let mut parts = format.split('%');
@@ -598,10 +589,10 @@ impl<'a> Evaluator<'a> {
                 .map_or_else(|| "$(unknown)".to_owned(), PythonValue::launch_text);
             match part.strip_prefix(['s', 'd']) {
                 Some(rest) => text.extend([&value, rest]),
-                None => return PythonValue::Unknown(line(at)),
+                None => return unknown(at),
             }
         }
-        self.kept(PythonValue::Text(text), at)
+        self.kept(Text(text), at)
     }
 
     fn logic(&mut self, node: Node<'a>) -> PythonValue {
@@ -613,7 +604,7 @@ impl<'a> Evaluator<'a> {
             "boolean_operator" => self.both(node),
             _ => self.compared(node),
         };
-        truth.map_or(PythonValue::Unknown(line(node)), PythonValue::Bool)
+        truth.map_or(unknown(node), Bool)
     }
 
     fn both(&mut self, node: Node<'a>) -> Option<bool> {
@@ -646,10 +637,10 @@ impl<'a> Evaluator<'a> {
             "in" => left.is_in(&right),
             "not in" => left.is_in(&right).map(|inside| !inside),
             sign => match (sign, left, right) {
-                ("<", PythonValue::Number(a), PythonValue::Number(b)) => Some(a < b),
-                (">", PythonValue::Number(a), PythonValue::Number(b)) => Some(a > b),
-                ("<=", PythonValue::Number(a), PythonValue::Number(b)) => Some(a <= b),
-                (">=", PythonValue::Number(a), PythonValue::Number(b)) => Some(a >= b),
+                ("<", Number(a), Number(b)) => Some(a < b),
+                (">", Number(a), Number(b)) => Some(a > b),
+                ("<=", Number(a), Number(b)) => Some(a <= b),
+                (">=", Number(a), Number(b)) => Some(a >= b),
                 _ => None,
             },
         }
@@ -659,25 +650,23 @@ impl<'a> Evaluator<'a> {
     fn choice(&mut self, node: Node<'a>) -> PythonValue {
         let parts = children(node);
         let [yes, condition, no] = parts[..] else {
-            return PythonValue::Unknown(line(node));
+            return unknown(node);
         };
         match self.value(condition).truth() {
             Some(true) => self.value(yes),
             Some(false) => self.value(no),
-            None => PythonValue::Unknown(line(node)),
+            None => unknown(node),
         }
     }
 
     fn subscript(&mut self, value: Node<'a>, key: Node<'a>) -> PythonValue {
         if self.text(value) == "os.environ" {
-            return PythonValue::Text(format!("$(env {})", self.value(key).launch_text()));
+            return Text(format!("$(env {})", self.value(key).launch_text()));
         }
         let (found, key_value) = (self.value(value), self.value(key));
         let part = match (&found, &key_value) {
-            (PythonValue::List(list), PythonValue::Number(at)) => {
-                usize::try_from(*at).ok().and_then(|at| list.get(at))
-            }
-            (PythonValue::Dict(map), key) => {
+            (List(list), Number(at)) => usize::try_from(*at).ok().and_then(|at| list.get(at)),
+            (Dict(map), key) => {
                 let key = key.launch_text();
                 map.iter()
                     .find(|(name, _)| *name == key)
@@ -685,7 +674,7 @@ impl<'a> Evaluator<'a> {
             }
             _ => None,
         };
-        part.cloned().unwrap_or(PythonValue::Unknown(line(key)))
+        part.cloned().unwrap_or(unknown(key))
     }
 }
 
@@ -742,7 +731,7 @@ impl Arguments {
 impl<'a> Evaluator<'a> {
     fn call_expression(&mut self, node: Node<'a>) -> PythonValue {
         let Some(function) = node.child_by_field_name("function") else {
-            return PythonValue::Unknown(line(node));
+            return unknown(node);
         };
         let arguments = self.arguments(node);
         if function.kind() == "attribute"
@@ -758,7 +747,7 @@ impl<'a> Evaluator<'a> {
         }
         let full = self.text(function);
         let name = full.rsplit('.').next().unwrap_or(full);
-        if let ("arg", Some(PythonValue::Text(argument))) = (full, arguments.positional.first()) {
+        if let ("arg", Some(Text(argument))) = (full, arguments.positional.first()) {
             return self.lookup(argument, node);
         }
         if let Some(own) = self.function(name) {
@@ -768,7 +757,7 @@ impl<'a> Evaluator<'a> {
             .action(name, &arguments)
             .or_else(|| substitution(name, &arguments))
             .or_else(|| plain(full, &arguments))
-            .unwrap_or(PythonValue::Unknown(line(node)));
+            .unwrap_or(unknown(node));
         self.kept(value, node)
     }
 
@@ -792,9 +781,7 @@ impl<'a> Evaluator<'a> {
                     arguments.named.push((self.text(name).to_owned(), value));
                 }
                 ("dictionary_splat", ..) => {
-                    if let Some(PythonValue::Dict(map)) =
-                        argument.named_child(0).map(|n| self.value(n))
-                    {
+                    if let Some(Dict(map)) = argument.named_child(0).map(|n| self.value(n)) {
                         arguments.named.extend(map);
                     }
                 }
@@ -823,14 +810,13 @@ impl<'a> Evaluator<'a> {
             "append" | "add_action" | "add_entity" => self.grow(object, vec![first()?]),
             "insert" => self.grow(object, vec![arguments.positional.get(1)?.clone()]),
             "extend" => match first()? {
-                PythonValue::List(list) => self.grow(object, list),
+                List(list) => self.grow(object, list),
                 other => self.grow(object, vec![other]),
             },
             "items" => match self.value(object) {
-                PythonValue::Dict(map) => {
-                    let pair =
-                        |(key, value)| PythonValue::List(vec![PythonValue::Text(key), value]);
-                    Some(PythonValue::List(map.into_iter().map(pair).collect()))
+                Dict(map) => {
+                    let pair = |(key, value)| List(vec![Text(key), value]);
+                    Some(List(map.into_iter().map(pair).collect()))
                 }
                 _ => None,
             },
@@ -838,25 +824,23 @@ impl<'a> Evaluator<'a> {
             "perform" => Some(self.value(object)).filter(|value| value.text().is_some()),
             "find" => {
                 let share = self.value(object).text()?;
-                share
-                    .starts_with("$(find-pkg-share")
-                    .then_some(PythonValue::Text(share))
+                share.starts_with("$(find-pkg-share").then_some(Text(share))
             }
             "format" => {
                 let text = self.value(object).text()?;
-                formatted(&text, arguments).map(PythonValue::Text)
+                formatted(&text, arguments).map(Text)
             }
             "lower" => self
                 .value(object)
                 .text()
                 .filter(|t| !t.contains("$("))
-                .map(|t| PythonValue::Text(t.to_lowercase())),
+                .map(|t| Text(t.to_lowercase())),
             "get" => {
                 if self.text(object) == "os.environ" {
                     return plain("os.getenv", arguments);
                 }
                 match self.value(object) {
-                    PythonValue::Dict(map) => {
+                    Dict(map) => {
                         let key = first()?.launch_text();
                         let found = map
                             .into_iter()
@@ -881,8 +865,8 @@ impl<'a> Evaluator<'a> {
 
     /// Adds to the list in a variable.
     fn grow(&mut self, object: Node<'a>, more: Vec<PythonValue>) -> Option<PythonValue> {
-        let more = self.kept(PythonValue::List(more), object);
-        if let (PythonValue::List(list), PythonValue::List(more)) = (self.variable(object)?, more) {
+        let more = self.kept(List(more), object);
+        if let (List(list), List(more)) = (self.variable(object)?, more) {
             list.extend(more);
         }
         Some(PythonValue::None)
@@ -890,7 +874,7 @@ impl<'a> Evaluator<'a> {
 
     /// The value of an attribute, such as `Path(…).parent`.
     fn attribute(&mut self, node: Node<'a>) -> PythonValue {
-        let unknown = PythonValue::Unknown(line(node));
+        let unknown = Unknown(line(node));
         let Some(object) = node.child_by_field_name("object") else {
             return unknown;
         };
@@ -898,7 +882,7 @@ impl<'a> Evaluator<'a> {
             .child_by_field_name("attribute")
             .map_or("", |n| self.text(n));
         match (name, self.value(object)) {
-            ("parent", PythonValue::Text(path)) => PythonValue::Text(parent(&path).to_owned()),
+            ("parent", Text(path)) => Text(parent(&path).to_owned()),
             _ => unknown,
         }
     }
@@ -927,7 +911,7 @@ fn substitution(name: &str, arguments: &Arguments) -> Option<PythonValue> {
             }
         }
         "PathJoinSubstitution" | "PathJoin" => match arguments.get(0, "substitutions")? {
-            PythonValue::List(parts) => path(parts),
+            List(parts) => path(parts),
             other => other.launch_text(),
         },
         "PythonExpression" => format!("$(eval {})", text(0, "expression")?),
@@ -948,7 +932,7 @@ fn substitution(name: &str, arguments: &Arguments) -> Option<PythonValue> {
         | "FrontendLaunchDescriptionSource" => text(0, "launch_file_path")?,
         _ => return None,
     };
-    Some(PythonValue::Text(made))
+    Some(Text(made))
 }
 
 /// The result of a function of Python itself.
@@ -956,18 +940,16 @@ fn plain(full: &str, arguments: &Arguments) -> Option<PythonValue> {
     let first = arguments.positional.first();
     let text = || first.map(PythonValue::launch_text);
     match full {
-        "os.path.join" | "path.join" | "join" => {
-            Some(PythonValue::Text(path(&arguments.positional)))
-        }
-        "os.path.dirname" | "path.dirname" => Some(PythonValue::Text(parent(&text()?).to_owned())),
+        "os.path.join" | "path.join" | "join" => Some(Text(path(&arguments.positional))),
+        "os.path.dirname" | "path.dirname" => Some(Text(parent(&text()?).to_owned())),
         "os.path.abspath" | "os.path.realpath" | "os.path.normpath" | "Path" | "pathlib.Path"
-        | "str" => text().map(PythonValue::Text),
+        | "str" => text().map(Text),
         "os.getenv" | "os.environ.get" => substitution("getenv", arguments),
-        "list" | "tuple" => Some(first.cloned().unwrap_or(PythonValue::List(Vec::new()))),
-        "dict" => Some(PythonValue::Dict(arguments.named.clone())),
+        "list" | "tuple" => Some(first.cloned().unwrap_or(List(Vec::new()))),
+        "dict" => Some(Dict(arguments.named.clone())),
         "range" => {
             let number = |at: usize| match arguments.positional.get(at) {
-                Some(PythonValue::Number(number)) => Some(*number),
+                Some(Number(number)) => Some(*number),
                 _ => None,
             };
             let (from, to) = match number(1) {
@@ -975,18 +957,18 @@ fn plain(full: &str, arguments: &Arguments) -> Option<PythonValue> {
                 None => (0, number(0)?),
             };
             let is_small = to.checked_sub(from).is_some_and(|n| n <= 1000);
-            is_small.then(|| PythonValue::List((from..to).map(PythonValue::Number).collect()))
+            is_small.then(|| List((from..to).map(Number).collect()))
         }
         "len" => match first? {
-            PythonValue::List(list) => i64::try_from(list.len()).ok().map(PythonValue::Number),
+            List(list) => i64::try_from(list.len()).ok().map(Number),
             _ => None,
         },
         "enumerate" => match first? {
-            PythonValue::List(list) => {
+            List(list) => {
                 let pairs = (0..)
                     .zip(list)
-                    .map(|(n, v)| PythonValue::List(vec![PythonValue::Number(n), v.clone()]));
-                Some(PythonValue::List(pairs.collect()))
+                    .map(|(n, v)| List(vec![Number(n), v.clone()]));
+                Some(List(pairs.collect()))
             }
             _ => None,
         },
@@ -1152,11 +1134,11 @@ fn of_tree(tree: &Tree) -> (usize, usize) {
 /// The value of an argument's text: `true` and `false` become Booleans.
 fn of_text(text: &str) -> PythonValue {
     match text {
-        "true" | "True" => PythonValue::Bool(true),
-        "false" | "False" => PythonValue::Bool(false),
+        "true" | "True" => Bool(true),
+        "false" | "False" => Bool(false),
         other => other
             .parse()
-            .map_or_else(|_| PythonValue::Text(other.to_owned()), PythonValue::Number),
+            .map_or_else(|_| Text(other.to_owned()), Number),
     }
 }
 

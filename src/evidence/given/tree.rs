@@ -107,12 +107,8 @@ pub(super) fn of_yaml(path: &Path, text: &str) -> Result<Option<Tree>> {
         return Ok(None);
     };
     let Value::Array(list) = launch else {
-        return Err(Error::bad_file(
-            path,
-            1,
-            "`launch` is not a list",
-            YAML_HINT,
-        ));
+        let reason = "`launch` is not a list";
+        return Err(Error::bad_file(path, 1, reason, YAML_HINT));
     };
     Ok(Some(Tree {
         tag: "launch".to_owned(),

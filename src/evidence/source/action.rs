@@ -51,11 +51,8 @@ pub(crate) fn read(
             let node = context.name(client);
             let goal = context.name(&format!("{action}/goal"));
             let words = || format!("goal `{id}` on {action}");
-            context.observation(
-                Observation::Publish(node, goal),
-                Confidence::Inferred,
-                words,
-            );
+            let stated = Observation::Publish(node, goal);
+            context.observation(stated, Confidence::Inferred, words);
         }
     }
     Ok(())

@@ -46,11 +46,8 @@ pub(crate) fn read(
                 let node = context.name(&format!("/{node}"));
                 let topic = context.stream.topic;
                 let words = || format!("status `{name}`");
-                context.observation(
-                    Observation::Reports(node, topic),
-                    Confidence::Inferred,
-                    words,
-                );
+                let stated = Observation::Reports(node, topic);
+                context.observation(stated, Confidence::Inferred, words);
             }
         }
     }

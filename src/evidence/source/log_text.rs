@@ -197,12 +197,8 @@ pub(crate) fn conclude_duplicates(source: SourceId, known: &mut Conclusions<'_>)
             continue;
         };
         for time in known.times(&fact) {
-            known.incident(
-                source,
-                ElementKey::Node(node),
-                IncidentKind::Duplicate,
-                time,
-            );
+            let what = ElementKey::Node(node);
+            known.incident(source, what, IncidentKind::Duplicate, time);
         }
     }
 }

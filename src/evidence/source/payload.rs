@@ -129,11 +129,8 @@ fn turns(
         .filter(|pair| pair[0].input != pair[1].input)
     {
         let [from, to] = [pair[0], pair[1]].map(|run| flows[run.input].0);
-        let (what, kind) = (
-            ElementKey::Topic(flows[output].0),
-            IncidentKind::Turn(from, to),
-        );
-        known.incident(source, what, kind, pair[1].first);
+        let what = ElementKey::Topic(flows[output].0);
+        known.incident(source, what, IncidentKind::Turn(from, to), pair[1].first);
     }
 }
 
@@ -375,12 +372,8 @@ fn select(
         return;
     }
     for pair in inputs.windows(2).filter(|pair| pair[0].1 != pair[1].1) {
-        known.incident(
-            source,
-            what,
-            IncidentKind::Turn(pair[0].1, pair[1].1),
-            pair[1].0,
-        );
+        let turn = IncidentKind::Turn(pair[0].1, pair[1].1);
+        known.incident(source, what, turn, pair[1].0);
     }
 }
 

@@ -48,11 +48,9 @@ pub(crate) fn announced(context: &mut SourceContext<'_>) {
     let words = same.collect::<Vec<_>>().join(", ");
     if !words.is_empty() {
         let (topic, quality) = (context.stream.topic, context.name(&words));
-        context.observation(
-            Observation::Quality(topic, quality),
-            Confidence::Declared,
-            || format!("offered as {words}"),
-        );
+        let offered = || format!("offered as {words}");
+        let stated = Observation::Quality(topic, quality);
+        context.observation(stated, Confidence::Declared, offered);
     }
 }
 
@@ -61,12 +59,8 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for fact in known.observed(source) {
         if let Observation::Quality(topic, _) = fact.observation {
             let what = ElementKey::Topic(topic);
-            known.add(Inference::new(
-                source,
-                what,
-                Confidence::Declared,
-                Validity::Whole,
-            ));
+            let when = Validity::Whole;
+            known.add(Inference::new(source, what, Confidence::Declared, when));
         }
     }
 }

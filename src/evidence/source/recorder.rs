@@ -38,12 +38,8 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let recorders: BTreeSet<Name> = stated.chain(named).collect();
     for recorder in &recorders {
         let what = ElementKey::Node(*recorder);
-        known.add(Inference::new(
-            source,
-            what,
-            Confidence::Stated,
-            Validity::Unending,
-        ));
+        let when = Validity::Unending;
+        known.add(Inference::new(source, what, Confidence::Stated, when));
     }
     if recorders.len() != 1 {
         return;

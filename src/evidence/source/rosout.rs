@@ -281,10 +281,8 @@ fn add_rule(source: SourceId, known: &mut Conclusions<'_>, space: &str) {
     let rule = |what, when| Inference::new(source, what, Confidence::Inferred, when);
     for node in nodes {
         if node != log {
-            known.add(rule(
-                ElementKey::Publish(node, log),
-                Validity::Like(ElementKey::Node(node)),
-            ));
+            let when = Validity::Like(ElementKey::Node(node));
+            known.add(rule(ElementKey::Publish(node, log), when));
         }
     }
     known.add(rule(ElementKey::Node(log), Validity::Always));

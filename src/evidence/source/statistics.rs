@@ -64,11 +64,8 @@ pub(crate) fn read(
     }
     if !subscriber.is_empty() {
         let node = context.name(subscriber);
-        context.observation(
-            Observation::Subscribe(node, of),
-            Confidence::Measured,
-            words,
-        );
+        let stated = Observation::Subscribe(node, of);
+        context.observation(stated, Confidence::Measured, words);
     }
     Ok(())
 }

@@ -1,7 +1,8 @@
 //! The actions of launch and `launch_ros` as elements of the XML format.
 
 use super::super::tree::Tree;
-use super::{Arguments, Evaluator, PythonValue, UNREAD};
+use super::PythonValue::{self, Action, Dict, Function, List, Text, Unknown};
+use super::{Arguments, Evaluator, UNREAD};
 
 /// Actions that start no node and change no name.
 const OTHER: &[&str] = &[
@@ -27,16 +28,16 @@ impl Evaluator<'_> {
         let mut tree = match name {
             "LaunchDescription" => {
                 return Some(match arguments.get(0, "initial_entities") {
-                    Some(list @ PythonValue::List(_)) => list.clone(),
-                    Some(PythonValue::None) | None => PythonValue::List(Vec::new()),
-                    Some(other) => PythonValue::List(vec![other.clone()]),
+                    Some(list @ List(_)) => list.clone(),
+                    Some(PythonValue::None) | None => List(Vec::new()),
+                    Some(other) => List(vec![other.clone()]),
                 });
             }
             "OpaqueFunction" => self.opaque(arguments),
             _ => tree(name, arguments)?,
         };
         tree.line = arguments.line;
-        if let Some(PythonValue::Action(condition)) = arguments.named("condition") {
+        if let Some(Action(condition)) = arguments.named("condition") {
             tree.attributes.extend(condition.attributes.iter().cloned());
         } else if arguments
             .named("condition")
@@ -49,25 +50,25 @@ impl Evaluator<'_> {
             tree.attributes
                 .insert(0, ("if".to_owned(), "$(unknown)".to_owned()));
         }
-        Some(PythonValue::Action(tree))
+        Some(Action(tree))
     }
 
     /// A function that the launch system calls: followed like any other in this file; values from the running system
     /// are unknown.
     fn opaque(&mut self, arguments: &Arguments) -> Tree {
         let function = match arguments.get(0, "function") {
-            Some(PythonValue::Function(name)) => self.function(name),
+            Some(Function(name)) => self.function(name),
             _ => None,
         };
         let Some(function) = function else {
             return element(UNREAD, &[]);
         };
-        let mut positional = vec![PythonValue::Unknown(arguments.line)];
-        if let Some(PythonValue::List(more)) = arguments.named("args") {
+        let mut positional = vec![Unknown(arguments.line)];
+        if let Some(List(more)) = arguments.named("args") {
             positional.extend(more.iter().cloned());
         }
         let named = match arguments.named("kwargs") {
-            Some(PythonValue::Dict(map)) => map.clone(),
+            Some(Dict(map)) => map.clone(),
             _ => Vec::new(),
         };
         let made = self.call(function, &positional, &named);
@@ -156,7 +157,7 @@ fn tree(name: &str, given: &Arguments) -> Option<Tree> {
 fn node(tag: &str, given: &Arguments) -> Tree {
     let text = |name| given.text(usize::MAX, name);
     let words = match given.named("arguments") {
-        Some(PythonValue::List(words)) => words.iter().map(PythonValue::launch_text).collect(),
+        Some(List(words)) => words.iter().map(PythonValue::launch_text).collect(),
         _ => Vec::new(),
     };
     let mut tree = element(
@@ -176,9 +177,9 @@ fn node(tag: &str, given: &Arguments) -> Tree {
             ),
         ],
     );
-    if let Some(PythonValue::List(remaps)) = given.named("remappings") {
+    if let Some(List(remaps)) = given.named("remappings") {
         for remap in remaps {
-            if let PythonValue::List(pair) = remap
+            if let List(pair) = remap
                 && let [from, to] = &pair[..]
             {
                 let sides = [
@@ -200,17 +201,16 @@ fn include(given: &Arguments) -> Tree {
         &[("file", file), ("pass_all_args", Some("true".to_owned()))],
     );
     let pairs = match given.get(1, "launch_arguments") {
-        Some(PythonValue::List(pairs)) => pairs.clone(),
-        Some(PythonValue::Dict(map)) => {
-            let pair = |(key, value): &(String, PythonValue)| {
-                PythonValue::List(vec![PythonValue::Text(key.clone()), value.clone()])
-            };
+        Some(List(pairs)) => pairs.clone(),
+        Some(Dict(map)) => {
+            let pair =
+                |(key, value): &(String, PythonValue)| List(vec![Text(key.clone()), value.clone()]);
             map.iter().map(pair).collect()
         }
         _ => Vec::new(),
     };
     for pair in pairs {
-        if let PythonValue::List(pair) = pair
+        if let List(pair) = pair
             && let [name, value] = &pair[..]
         {
             let sides = [
@@ -237,9 +237,9 @@ fn element(tag: &str, attributes: &[(&str, Option<String>)]) -> Tree {
 /// The actions in a value, with lists flattened; unknown values are kept as unknown.
 pub(super) fn trees(value: &PythonValue) -> Vec<Tree> {
     match value {
-        PythonValue::List(list) => list.iter().flat_map(trees).collect(),
-        PythonValue::Action(tree) => vec![tree.clone()],
-        PythonValue::Unknown(line) => vec![Tree {
+        List(list) => list.iter().flat_map(trees).collect(),
+        Action(tree) => vec![tree.clone()],
+        Unknown(line) => vec![Tree {
             tag: UNREAD.to_owned(),
             line: *line,
             ..Tree::default()
