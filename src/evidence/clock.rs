@@ -13,9 +13,9 @@ use crate::evidence::observation::Observations;
 use crate::evidence::times::Calendar;
 
 pub(crate) const DAY: i64 = 86_400_000_000_000;
-/// The distance in days beyond which times count as far from all others.
+/// The distance in days beyond which times count as far from all others: no mission has a pause of a year.
 pub(crate) const FAR_DAYS: i64 = 365;
-/// The most far messages that are set aside, as one in so many messages.
+/// The most far messages that are set aside, as one in so many messages: more are no accident, but a clock that jumped.
 const RARE: u64 = 10;
 /// The days after 1970, ten years, that count as an unset clock: without a battery it begins there, and no robot
 /// recorded then.
@@ -136,7 +136,7 @@ fn clusters(all: impl Iterator<Item = DayCluster>) -> Vec<DayCluster> {
     clusters
 }
 
-/// The number of clusters that are listed.
+/// The number of clusters that are listed: a notice is one line.
 const NAMED: usize = 3;
 
 fn stated(clusters: &[DayCluster]) -> String {
@@ -157,11 +157,11 @@ fn stated(clusters: &[DayCluster]) -> String {
 
 // Differences between the clocks of several recorders, by the messages that two of them recorded.
 
-/// The fewest common messages that are significant.
+/// The fewest common messages that are significant: a few short ones may be equal by chance.
 const FEWEST: usize = 10;
 /// The fewest topics that must agree: a node may send the same sequence again.
 const TOPICS: usize = 2;
-/// The share, in per cent, of the messages in common that must agree about the offset.
+/// The share, in per cent, of the messages in common that must agree about the offset; the others were delayed on their way.
 const SHARE: usize = 80;
 /// The largest difference between the offsets of two messages, in nanoseconds: they take different paths to
 /// the recorders.

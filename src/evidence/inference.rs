@@ -725,7 +725,8 @@ impl Closed {
     }
 }
 
-/// The time after a node's start at which it has made its connections, in nanoseconds.
+/// The time after a node's start at which it has made its connections, in nanoseconds; a list made
+/// earlier may lack some.
 const SETTLED_NS: i64 = 5_000_000_000;
 
 /// Whether there is a list for `of` without `member`.

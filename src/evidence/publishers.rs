@@ -104,7 +104,8 @@ impl NamedTopics {
     }
 }
 
-/// The longest time from the start of a node to its first message on a topic of its own, in nanoseconds.
+/// The longest time from the start of a node to its first message on a topic of its own, in nanoseconds: with much
+/// longer, nodes that start one after the other would be confused.
 const SOON_NS: i64 = 5_000_000_000;
 
 /// Whether the numbers in the headers of a topic show that one node sent all its messages: they are one
@@ -160,7 +161,8 @@ fn rewritten(streams: &[Stream], of_bag: &[usize], named: &NamedTopics) -> bool 
 //
 // A node with regular other evidence counts as ended if all of it stops for good when its topic falls silent
 // for longer than ever before. Messages after that silence may not be its own: they are attributed to the
-// only node that names the topic and starts with them, if there is one.
+// only node that names the topic and starts with them, if there is one. For example, `/planner_a` stops at 60 s and `/path`
+// with it; at 75 s `/path` continues and `/planner_b` logs for the first time: the rest of `/path` is by `/planner_b`.
 
 /// Finds the nodes of a rewritten bag that ended before their topics did; `of_bag` contains the indices of
 /// its streams. Each gets an observation of its end; the rest of a topic whose header names it becomes a

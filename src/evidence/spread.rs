@@ -8,7 +8,8 @@ pub(crate) struct Spread {
     squares: f64,
 }
 
-/// The number of standard errors by which two variances must differ to count as different.
+/// The number of standard errors by which two variances must differ to count as different: chance does it once in a thousand
+/// times.
 const CLEAR: f64 = 3.0;
 
 impl Spread {

@@ -602,7 +602,7 @@ fn by_constructor(kind: &str) -> Option<(Made, &str)> {
     }
 }
 
-/// The kind of object that a made_by_transform class creates.
+/// The kind of object that a transform class creates.
 fn made_by_transform(scope: &str, name: &str) -> Option<Made> {
     Some(match (scope, name) {
         ("tf" | "tf2_ros", "TransformBroadcaster") => Made::Broadcaster,
@@ -629,7 +629,7 @@ struct Aliases {
     open: Vec<String>,
 }
 
-/// The most steps from alias to alias that are followed.
+/// The most steps from alias to alias that are followed, as aliases may be circular.
 const DEEPEST: usize = 8;
 
 impl Aliases {

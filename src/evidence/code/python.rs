@@ -44,7 +44,7 @@ struct PythonReader<'a> {
     bound: BTreeMap<&'a str, Node<'a>>,
 }
 
-/// The most iterations of the loops around a call that are followed.
+/// The most iterations of the loops around a call that are followed: nested loops multiply them.
 const MOST_TURNS: usize = 64;
 
 impl<'a> PythonReader<'a> {

@@ -20,16 +20,16 @@ use crate::evidence::given::{
 /// The deepest nesting of includes; deeper ones are cyclic.
 const DEEPEST: usize = 16;
 
-/// The cost of opening a file, in bytes of work.
+/// The cost of opening a file, in bytes of work: about the time in which so much text is read.
 const FILE: usize = 8 << 10;
 
-/// The assumed length of a launch file of a workspace, in bytes.
+/// The assumed length of a launch file of a workspace, in bytes: it bounds the work that each may cause.
 const OWN_TEXT: usize = 10_000;
 
-/// The deepest nesting of groups and files that is followed.
+/// The deepest nesting of groups and files that is followed, which the stack must hold.
 const NESTED: usize = 200;
 
-/// The cost of keeping one entry of a file, in bytes of work.
+/// The cost of keeping one entry of a file, in bytes of work: about its memory.
 const ENTRY: usize = 150;
 
 /// A node that a launch file starts.
@@ -67,7 +67,7 @@ impl LaunchedNode {
     }
 }
 
-/// The most topics that the arguments of a node name.
+/// The most topics that the arguments of a node name; more are hostile.
 const MOST_TOPICS: usize = 1000;
 
 /// The treatment of conditions that cannot be decided statically.

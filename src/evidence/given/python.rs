@@ -73,10 +73,10 @@ fn word(is_true: bool) -> String {
 
 // Statements.
 
-/// The deepest nesting of expressions and calls that is followed.
+/// The deepest nesting of expressions and calls that is followed, which the stack must hold.
 const NESTED: usize = 120;
 
-/// The cost of one step, in bytes of work.
+/// The cost of one step, in bytes of work: as that of so much text.
 const STEP: usize = 16;
 
 struct Evaluator<'a> {
@@ -1036,7 +1036,7 @@ enum PythonValue {
     Function(String),
 }
 
-/// The deepest nesting of values that is kept.
+/// The deepest nesting of values that is kept, which the stack must hold.
 const DEEPEST: usize = 48;
 
 impl PythonValue {

@@ -78,7 +78,7 @@ fn text_of<'a>(value: &'a Value, keys: &[&str]) -> Option<&'a str> {
     keys.iter().find_map(|key| value.get(key)?.as_str())
 }
 
-/// The most lines with the same beginning that are searched for the first one.
+/// The most lines with the same beginning that are searched for the first one: it only bounds the work for an error.
 const MOST_ALIKE: usize = 100;
 
 struct TopologyYaml<'a> {

@@ -259,7 +259,7 @@ impl<'a> Sections<'a> {
     }
 }
 
-/// The most characters of a text that an error quotes.
+/// The most characters of a text that an error quotes: a notice is one line.
 pub(super) const LONGEST_QUOTE: usize = 60;
 
 pub(super) fn without_comment(line: &str) -> &str {
@@ -306,7 +306,7 @@ fn length(array: &str) -> Option<Array> {
 
 // OMG IDL, as ROS 2 writes it (<https://design.ros2.org/articles/idl_interface_definition.html>).
 
-/// The member that ROS 2 adds to idl_messages without fields, as IDL has no empty structures.
+/// The member that ROS 2 adds to messages without fields, as IDL has no empty structures.
 const NOTHING: &str = "structure_needs_at_least_one_member";
 
 /// Types of IDL that `.msg` files call otherwise; those of several words first.

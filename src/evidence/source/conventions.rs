@@ -74,7 +74,7 @@ pub(crate) fn anonymous(source: SourceId, known: &mut Conclusions<'_>) {
 }
 
 // The publisher of a topic with messages that name none: if only one node is known to publish it, the messages are from
-// that node.
+// that node. For example, if only `/gps` is known to publish `/fix` from its log, it sent all messages of `/fix`.
 
 /// Topics that any node may publish, so that one known publisher does not imply that it is the only one.
 const SHARED: [&str; 8] = [
@@ -154,7 +154,7 @@ fn own_config(source: SourceId, known: &mut Conclusions<'_>, node: Name, topic: 
 }
 
 // Private names: a topic below a node's own full name belongs to the node, so it publishes it if no other
-// publisher is known.
+// publisher is known. For example, `/move_base/status` is by `/move_base`.
 
 /// Beginnings of the last part of names that others publish: goals for an action, commands for a controller.
 const TAKEN: [&str; 16] = [

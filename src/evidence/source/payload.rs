@@ -1,5 +1,6 @@
 //! Messages forwarded byte by byte (relay, throttle, mux, drop, republish): the node that publishes the
-//! copies subscribes to the topic that had them first; and the choice that a mux reports.
+//! copies subscribes to the topic that had them first; and the choice that a mux reports. For example, 500 of 500 messages of
+//! `/cmd_vel` have the bytes of messages of `/nav_vel` just before, so the publisher of `/cmd_vel` subscribes to `/nav_vel`.
 //!
 //! The length and the first bytes are compared, by a hash; content that is repeated in its own topic (an
 //! empty message, a constant) is not significant and is counted once. The budget is that of
@@ -20,17 +21,20 @@ use crate::evidence::observation::{Name, SourceId};
 use crate::evidence::source::SourceContext;
 use crate::evidence::spread::Spread;
 
-/// The fewest equal messages that are significant.
+/// The fewest equal messages that are significant: fewer short ones may be equal by chance.
 const FEWEST: u64 = 10;
-/// The share, in per cent, of an output's different messages that must be copies.
+/// The share, in per cent, of an output's different messages that must be copies: a relay sends nothing else, but the
+/// recorder may have lost some originals.
 const SHARE: u64 = 90;
-/// The least ratio of the number of times that the input comes first to that of the output.
+/// The least ratio of the number of times that the input comes first to that of the output: the recorder receives some
+/// copies before their originals, but not most of them.
 const FIRST: u64 = 3;
 /// The most flows that have a content at once; with more it is a constant.
 const MOST_AT_ONCE: usize = 32;
 /// The most runs of a flow that are kept: a mux that switches more often forwards several inputs at once.
 const MOST_RUNS: usize = 4096;
-/// The longest time in which a message is forwarded, in nanoseconds.
+/// The longest time in which a message is forwarded, in nanoseconds: with more, a constant that is sent now and
+/// then would count as forwarded.
 const RECENT_NS: i64 = 2_000_000_000;
 
 /// The number of bytes of a payload that are compared: a header's stamp and the first lines of an image are among them.

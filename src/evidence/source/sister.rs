@@ -1,5 +1,6 @@
 //! Sister namespaces: if a node's twin in another namespace publishes the same topics there and is known to
-//! subscribe to one, the node subscribes to it too.
+//! subscribe to one, the node subscribes to it too. For example, `/r1/nav` and `/r2/nav` publish `plan` and `status` in their
+//! namespaces, and `/r1/nav` is known to subscribe to `/r1/scan`: `/r2/nav` subscribes to `/r2/scan`.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +10,7 @@ use crate::evidence::observation::{Name, SourceId};
 
 /// The fewest topics of their namespace that twins publish: one alone may be chance.
 const FEWEST: usize = 2;
-/// The most twins that are compared one by one.
+/// The most twins that are compared one by one, since the work is the square of it.
 const MOST: usize = 200;
 
 /// A node with its namespace, and the topics it publishes inside it.

@@ -1,5 +1,6 @@
 //! The lifetimes of nodes from those of their edges, of edges within those of their nodes, of topics from
-//! both.
+//! both. For example, `/nav` logs from 3 s to 90 s and sends `/plan` at 1 Hz until 90 s of 300 s: `/nav` exists until 90 s,
+//! `/nav` publishes `/plan` for as long, and `/plan` exists as long as one of its ends does.
 
 use std::collections::BTreeSet;
 use std::rc::Rc;

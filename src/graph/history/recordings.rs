@@ -1,4 +1,6 @@
-//! The recordings of a mission: the time that each covers, and the times at which none of its messages was recorded.
+//! The recordings of a mission: the time that each covers, and the times at which none of its messages was recorded. For
+//! example, if 30 of 31 senders at 10 Hz are silent from 80 s to 95 s and go on with their numbers, the recorder was paused, and
+//! none of the nodes was silent.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;

@@ -1,5 +1,6 @@
 //! Restarts of nodes under the same name: after a gap the sequence numbers of a stream start over, or latched
-//! messages are sent again.
+//! messages are sent again. For example, `/scan` counts to 4711, is silent for 3 s and continues with 0, while no other topic of
+//! `/lidar` had a message in the gap: `/lidar` ended at the last message and began again with the next.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -27,7 +28,7 @@ pub(crate) struct Restart {
 /// Restarts by node, sorted by time.
 pub(crate) type Restarts = ById<Name, Vec<Restart>>;
 
-/// The most messages of a latched topic: one with more is sent again all the time.
+/// The most messages of a latched topic: one with more is sent again all the time, so that a repetition shows nothing.
 const LATCHED: u64 = 20;
 /// The most gaps, of all nodes together, around which numbers are requested: each requires reading two
 /// chunks.

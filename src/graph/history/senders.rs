@@ -114,7 +114,8 @@ struct SenderTimes {
 
 /// The most times kept per sender (32 MB); of more, every second one is dropped.
 const MOST_TIMES: usize = 1 << 22;
-/// The silence after which a message is kept in any case, and the one before it, in nanoseconds.
+/// The silence after which a message is kept in any case, and the one before it, in nanoseconds: half of the shortest gap, so
+/// that no gap is lost.
 const LATE_NS: i64 = 500_000_000;
 
 impl SenderTimes {
@@ -181,11 +182,14 @@ fn places(
 
 // Stretches of even messages, from the times of one sender: gaps and rate changes end them.
 
-/// The number of intervals on each side of a gap from which the usual one is taken.
+/// The number of intervals on each side of a gap from which the usual one is taken: enough for a median that a lost message
+/// does not change, few enough to follow a changing rate.
 const AROUND: usize = 9;
-/// The most pieces of a run that are searched for rate changes; intervals of longer runs are summed first.
+/// The most pieces of a run that are searched for rate changes; intervals of longer runs are summed first, so that the search
+/// takes the same time for an hour as for a minute.
 const PIECES: usize = 2048;
-/// The depth of splitting one sender's messages by rate; each level may double the number of rates.
+/// The depth of splitting one sender's messages by rate; each level may double the number of rates, so that there are at most
+/// 256.
 const DEPTH: usize = 8;
 /// The least gain in log likelihood of a rate change over chance: 3 standard deviations of a normal
 /// distribution are 3²/2 in log likelihood, doubled because of the many possible positions.
