@@ -139,15 +139,15 @@ mod python {
     use super::tree::Tree;
     use crate::base::error::{Error, Result};
 
-    const UNREAD: &str = "unread";
+    pub(super) const UNREAD: &str = "unread";
 
-    fn of_python(path: &Path, _text: &str) -> Result<Tree> {
+    pub(super) fn of_python(path: &Path, _text: &str) -> Result<Tree> {
         let reason = "launch files in Python need the feature `source`".to_owned();
         let hint = "build with `--features source`";
         Err(Error::bad_file(path, 0, reason, hint))
     }
 
-    fn evaluate(_expression: &str, _names: &BTreeMap<String, String>) -> Option<String> {
+    pub(super) fn evaluate(_expression: &str, _names: &BTreeMap<String, String>) -> Option<String> {
         None
     }
 }
