@@ -1,4 +1,8 @@
-//! Evidence of who publishes and subscribes to what: one file per kind of evidence in `source/`, one row each in [`SOURCES`].
+//! Evidence of who publishes and subscribes to what: a row per kind in [`SOURCES`], read and concluded in `source/`.
+//!
+//! In: the messages of bags, what the user gives (`given`) and source code (`code`). Out: [`conclude::Findings`], the
+//! inferences about every node, topic and edge. Begin with `collector`, which makes observations of messages, then
+//! `conclude`, which makes inferences of these.
 //!
 //! A source reads messages whose layout it knows, or the announcement of a connection, or draws conclusions
 //! from the whole mission; its findings are observations.
@@ -8,37 +12,109 @@ pub(crate) mod clock;
 pub mod code;
 pub mod collector;
 pub mod conclude;
-pub(crate) mod given;
+pub mod given;
 pub(crate) mod inference;
-mod kinds;
 pub(crate) mod message;
 pub(crate) mod numbers;
 pub(crate) mod observation;
-pub(crate) mod offsets;
 pub(crate) mod publishers;
 pub(crate) mod source;
 pub(crate) mod spread;
 #[cfg(feature = "source")]
 pub(crate) mod syntax;
-pub(crate) mod texts;
 pub(crate) mod times;
-pub mod topology;
 pub(crate) mod unknown;
 pub(crate) mod values;
 
-pub use kinds::Evidence;
 pub use observation::{Confidence, EvidenceLine};
 pub use source::Source;
 
-use message::{definition, parameters};
+use message::dynamic;
 use source::Read::{Log, Parameters, Payload};
 use source::{
-    NOTHING, action, anonymous, bond, connection, contract, diagnostics, discovery, duplicate,
-    dynamic_reconfigure, echo, equal_stamps, lifecycle, links, log_text, messages_lost, metrics,
-    only_publisher, parameter_events, payload, private_name, qos, qos_overrides, recorder,
-    rosgraph, rosout, rosout_ros2, rosout_rule, selected, service_event, sim_time, sister,
-    statistics, tf_pair, topic_statistics,
+    NOTHING, action, connection, contract, conventions, diagnostics, discovery, echo, equal_stamps,
+    lifecycle, log_text, parameters, payload, qos, recorder, rosgraph, rosout, service_event,
+    sister, statistics,
 };
+
+/// A set of kinds of evidence: bits at the indices of rows in [`SOURCES`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Evidence(u64);
+
+impl Evidence {
+    /// No evidence.
+    pub const NONE: Self = Self(0);
+
+    /// The set of the source with this word; empty for an unknown word.
+    pub fn of(word: &str) -> Self {
+        SOURCES
+            .iter()
+            .position(|s| s.word == word)
+            .map_or(Self::NONE, Self::row)
+    }
+
+    /// The set of the source in this row.
+    pub(crate) fn row(source: observation::SourceId) -> Self {
+        let bit = u32::try_from(source).unwrap_or(u32::MAX);
+        Self(1_u64.checked_shl(bit).unwrap_or(0))
+    }
+
+    /// The union of both sets.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Whether all of it is evidence without times: source code, launch files, and stand-ins for nodes without a name.
+    pub fn is_timeless(self) -> bool {
+        self.is_within(&["source", "source_only", "launch", "unknown", "owned_type"])
+    }
+
+    /// Whether all of it is evidence of stand-ins for nodes that the bag does not name.
+    pub fn is_guess(self) -> bool {
+        self.is_within(&["source_only", "unknown", "owned_type"])
+    }
+
+    /// Whether the set is not empty and has only these kinds.
+    fn is_within(self, words: &[&str]) -> bool {
+        let all = words.iter().map(|word| Self::of(word));
+        let all = all.fold(Self::NONE, Self::and);
+        !self.is_empty() && self.0 & !all.0 == 0
+    }
+
+    /// Whether the set is empty.
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Whether the set has the kind with this word.
+    pub fn has(self, word: &str) -> bool {
+        self.0 & Self::of(word).0 != 0
+    }
+
+    /// The words of all kinds, in the order of [`SOURCES`].
+    pub fn all_words() -> impl Iterator<Item = &'static str> {
+        SOURCES.iter().map(|source| source.word)
+    }
+
+    /// A description of each kind in the set, in a line of plain words, in the order of [`SOURCES`].
+    pub(crate) fn lines(self) -> impl Iterator<Item = String> {
+        let line = |source: &Source| format!("{}: {}", source.word, source.about.replace('`', ""));
+        self.rows().map(line)
+    }
+
+    /// The words of the set, in the order of [`SOURCES`].
+    pub fn words(self) -> impl Iterator<Item = &'static str> {
+        self.rows().map(|source| source.word)
+    }
+
+    /// The rows of the set.
+    fn rows(self) -> impl Iterator<Item = &'static Source> {
+        let rows = SOURCES.iter().enumerate();
+        let rows = rows.filter(move |(at, _)| self.0 >> at & 1 == 1);
+        rows.map(|(_, source)| source)
+    }
+}
 
 /// The row of the source with this word.
 pub(crate) fn source_id(word: &str) -> observation::SourceId {
@@ -67,7 +143,7 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "topic_statistics",
         about: "`/topic_statistics` of graph-monitor (`rosgraph_monitor_msgs/msg/TopicStatistics`)",
-        reads: &[(&[topic_statistics::SHAPE], Payload(topic_statistics::read))],
+        reads: &[(&[statistics::MONITOR], Payload(statistics::read_monitor))],
         ..NOTHING
     },
     Source {
@@ -113,26 +189,26 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "parameter_events",
         about: "`rcl_interfaces/msg/ParameterEvent`",
-        reads: &[(&[parameters::SHAPE], Parameters(parameter_events::read))],
+        reads: &[(&[parameters::SHAPE], Parameters(parameters::read_node))],
         ..NOTHING
     },
     Source {
         word: "qos_overrides",
         about: "`qos_overrides.<topic>` in parameter events, which rclcpp declares with each end",
-        reads: &[(&[parameters::SHAPE], Parameters(qos_overrides::read))],
+        reads: &[(&[parameters::SHAPE], Parameters(parameters::read_overrides))],
         ..NOTHING
     },
     Source {
         word: "sim_time",
         about: "`use_sim_time` in parameter events: such a node subscribes to `/clock`",
-        reads: &[(&[parameters::SHAPE], Parameters(sim_time::read))],
+        reads: &[(&[parameters::SHAPE], Parameters(parameters::read_sim_time))],
         own: true,
         ..NOTHING
     },
     Source {
         word: "links",
         about: "log records of roscpp about its connections",
-        reads: &[(definition::ROS1_LOGS, Log(links::read))],
+        reads: &[(dynamic::ROS1_LOGS, Log(log_text::read_links))],
         ..NOTHING
     },
     Source {
@@ -146,52 +222,52 @@ pub const SOURCES: &[Source] = &[
         word: "rosout",
         about: "log records of ROS 1 (`rosgraph_msgs/Log`) and ROS 2 (`rcl_interfaces/msg/Log`)",
         reads: &[
-            (definition::ROS1_LOGS, Log(rosout::read)),
-            (&[definition::LOG2], Log(rosout_ros2::read)),
+            (dynamic::ROS1_LOGS, Log(rosout::read)),
+            (&[dynamic::LOG2], Log(rosout::read_ros2)),
         ],
-        conclude: &[rosout::conclude, rosout_ros2::conclude],
+        conclude: &[rosout::conclude, rosout::conclude_ros2],
         own: true,
         ..NOTHING
     },
     Source {
         word: "log_text",
         about: "log messages in which a node names one of its topics",
-        reads: &[(definition::LOGS, Log(log_text::read))],
+        reads: &[(dynamic::LOGS, Log(log_text::read))],
         conclude: &[log_text::conclude],
         ..NOTHING
     },
     Source {
         word: "duplicate",
         about: "log texts about two nodes of one name",
-        reads: &[(definition::LOGS, Log(duplicate::read))],
-        conclude: &[duplicate::conclude],
+        reads: &[(dynamic::LOGS, Log(log_text::read_duplicates))],
+        conclude: &[log_text::conclude_duplicates],
         ..NOTHING
     },
     Source {
         word: "messages_lost",
         about: "`/events/rosbag2_messages_lost`: messages that the recorder lost (`rosbag2_interfaces/msg/MessagesLostEvent`)",
-        reads: &[(&[messages_lost::SHAPE], Payload(messages_lost::read))],
-        conclude: &[messages_lost::conclude],
+        reads: &[(&[recorder::LOST], Payload(recorder::read_lost))],
+        conclude: &[recorder::conclude_lost],
         ..NOTHING
     },
     Source {
         word: "metrics",
         about: "`/statistics` of ROS 2 (`statistics_msgs/msg/MetricsMessage`)",
-        reads: &[(&[metrics::SHAPE], Payload(metrics::read))],
-        conclude: &[metrics::conclude],
+        reads: &[(&[statistics::METRICS], Payload(statistics::read_metrics))],
+        conclude: &[statistics::conclude_metrics],
         own: true,
         ..NOTHING
     },
     Source {
         word: "dynamic_reconfigure",
         about: "`<node>/parameter_descriptions` and `<node>/parameter_updates` of ROS 1 belong to one node",
-        conclude: &[dynamic_reconfigure::conclude],
+        conclude: &[conventions::dynamic_reconfigure],
         ..NOTHING
     },
     Source {
         word: "private_name",
         about: "a topic in a node's private namespace with no other publisher",
-        conclude: &[private_name::conclude],
+        conclude: &[conventions::private_name],
         ..NOTHING
     },
     Source {
@@ -204,33 +280,33 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "bond",
         about: "both ends of a bond (`bond/Status`) publish and subscribe to its topic",
-        conclude: &[bond::conclude],
+        conclude: &[conventions::bond],
         ..NOTHING
     },
     Source {
         word: "echo",
         about: "log messages that quote a recorded message",
-        reads: &[(definition::LOGS, Log(echo::read))],
+        reads: &[(dynamic::LOGS, Log(echo::read))],
         conclude: &[echo::conclude],
         ..NOTHING
     },
     Source {
         word: "contract",
         about: "well-known nodes, by name and source file: their topics of the right type",
-        reads: &[(definition::LOGS, Log(contract::read))],
+        reads: &[(dynamic::LOGS, Log(contract::read))],
         conclude: &[contract::conclude],
         ..NOTHING
     },
     Source {
         word: "only_publisher",
         about: "messages without a publisher, of topics with one known publisher",
-        conclude: &[only_publisher::conclude],
+        conclude: &[conventions::only_publisher],
         ..NOTHING
     },
     Source {
         word: "payload",
         about: "messages forwarded byte by byte from input to output",
-        conclude: &[payload::conclude, selected::conclude],
+        conclude: &[payload::conclude, payload::conclude_selected],
         ..NOTHING
     },
     Source {
@@ -242,7 +318,7 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "tf_pair",
         about: "a subscriber of `/tf` also subscribes to `/tf_static`, and vice versa",
-        conclude: &[tf_pair::conclude],
+        conclude: &[conventions::tf_pair],
         ..NOTHING
     },
     Source {
@@ -254,20 +330,20 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "anonymous",
         about: "the start inside an anonymous name (`_PID_MILLISECONDS`, `_NANOSECONDS`)",
-        conclude: &[anonymous::conclude],
+        conclude: &[conventions::anonymous],
         ..NOTHING
     },
     Source {
         word: "recorder",
         about: "the recorder subscribes to everything it records; its log records name its source file",
-        reads: &[(definition::LOGS, Log(recorder::read))],
+        reads: &[(dynamic::LOGS, Log(recorder::read))],
         conclude: &[recorder::conclude],
         ..NOTHING
     },
     Source {
         word: "rosout_rule",
         about: "every node of ROS 1 publishes `/rosout`; the node `/rosout` forwards it to `/rosout_agg`",
-        conclude: &[rosout_rule::conclude],
+        conclude: &[rosout::conclude_rule],
         ..NOTHING
     },
     Source {

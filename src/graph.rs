@@ -1,37 +1,43 @@
 //! The computation graph of one window: its nodes, topics and edges, with their states and rates.
 //!
+//! In: everything recorded and the findings of the evidence. Out: [`Elements`], their `history` in continuous time, and
+//! a [`Graph`] per window. Begin with [`build`]: conclusions, the traffic of every topic, the history, then the windows.
+//!
 //! A graph contains numbers only; names are stored once, in the [`Elements`] of the whole mission, sorted, so that an index
 //! is an order and equal graphs are equal bytes.
 
-mod build;
 pub mod diff;
 mod elements;
 mod graphs;
 pub(crate) mod history;
-mod per_element;
 pub mod window;
+mod windowed;
 
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use crate::base::error::Result;
 pub use crate::base::ids::{ById, Id};
+use crate::base::notice::Notices;
 use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
-use crate::evidence::Confidence;
+use crate::evidence::collector::Recorded;
+use crate::evidence::conclude::{self, conclude};
+use crate::evidence::{Confidence, EvidenceLine};
 
 #[cfg(test)]
 pub(crate) use graphs::tests as graphs_for_tests;
 pub(crate) use graphs::{Column, ColumnCursor, ColumnWriter, GraphsWriter, Number, Row};
 pub use graphs::{Graphs, Iter as GraphsIter};
 
-pub use build::{Built, build};
-pub(crate) use build::{
-    History, Record, TopicCount, Windowed, counts, graphs, made, traffic, unread,
-};
 pub(crate) use elements::Wiring;
-pub use elements::{Edge, EdgeId, Element, Elements, Existence, Node, NodeId, Topic, TopicId};
-pub use per_element::PerElement;
+pub use elements::{
+    Edge, EdgeId, Element, Elements, Existence, Node, NodeId, PerElement, Topic, TopicId,
+};
+pub(crate) use history::{History, Record, made, traffic, unread};
+use history::{Life, Sending};
+pub(crate) use windowed::{TopicCount, Windowed, counts, graphs};
 
 worded! {
     /// The state of an element in one window.
@@ -244,6 +250,53 @@ pub(crate) fn mean_rate(count: u64, (first, last): (Stamp, Stamp)) -> Option<f64
 pub(crate) fn rate_between(intervals: u64, sending: Span, window: i64) -> Option<f64> {
     let is_long = sending.nanos() >= SHORTEST_SENDING_NS.min(window);
     per_second(intervals, sending).filter(|_| is_long && intervals > 0)
+}
+
+/// The result of building all graphs for one division of time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Built {
+    /// All nodes, topics and edges of the mission.
+    pub elements: Elements,
+    /// A graph per window.
+    pub graphs: Vec<Graph>,
+    /// The number of messages of each window.
+    pub messages: Vec<u64>,
+    /// The lifetimes of each element.
+    pub lives: PerElement<Vec<Life>>,
+    /// The messages of every sender.
+    pub sending: Sending,
+    /// Notices about the user's files.
+    pub notices: Notices,
+    /// Every requested piece of evidence.
+    pub lines: Vec<EvidenceLine>,
+}
+
+/// Draws the conclusions and builds the graph of each window. Windows are sorted by start, none inside another; they
+/// may overlap.
+///
+/// # Errors
+/// If the temporary file of times cannot be read.
+pub fn build(
+    recorded: &Recorded,
+    windows: &[Span],
+    options: &conclude::ConcludeOptions,
+) -> Result<Built> {
+    let mut findings = conclude(recorded, options)?;
+    let traffic = traffic(recorded, &findings)?;
+    let history = made(recorded, &mut findings, &traffic)?;
+    let windowed = graphs(recorded, &findings, &history, windows)?;
+    Ok(Built {
+        lives: PerElement::new(&history.elements, |what| {
+            let record = history.records.of(what);
+            record.map_or_else(Vec::new, |record| record.lives.clone())
+        }),
+        elements: history.elements,
+        graphs: windowed.graphs.iter().collect(),
+        messages: windowed.messages,
+        sending: history.sending,
+        notices: findings.notices,
+        lines: findings.lines,
+    })
 }
 
 #[cfg(test)]

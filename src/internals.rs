@@ -11,7 +11,7 @@ pub mod evidence {
     #[cfg(feature = "source")]
     pub use crate::evidence::code;
     pub use crate::evidence::{Confidence, Evidence, EvidenceLine, SOURCES, Source};
-    pub use crate::evidence::{collector, conclude, topology};
+    pub use crate::evidence::{collector, conclude, given as topology};
 }
 
 /// See `src/graph.rs`.

@@ -129,7 +129,7 @@ pub mod values {
     #[cfg(feature = "source")]
     pub use crate::evidence::code::SourceCode;
     pub use crate::evidence::collector::{CollectOptions, Recorded};
-    pub use crate::evidence::{Confidence, Evidence, EvidenceLine, conclude, topology};
+    pub use crate::evidence::{Confidence, Evidence, EvidenceLine, conclude, given as topology};
     pub use crate::graph::diff::ValueKind;
     pub use crate::graph::history::{Bound, Life, Sender, Sending, Stretch};
     pub use crate::graph::window::{Align, Cut, Division, Length};

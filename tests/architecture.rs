@@ -30,14 +30,16 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["mcap", "rosbag1", "rosbag2", "sqlite3", "zstd"],
     ]),
     ("evidence", &[
-        &["message", "spread", "syntax", "texts", "times"],
-        &["clock", "observation", "numbers", "topology"],
-        &["kinds", "inference", "values"],
-        &["code", "offsets", "publishers", "source"],
+        &["message", "spread", "syntax", "times"],
+        &["observation", "numbers"],
+        &["inference", "values"],
+        &["clock", "publishers", "source"],
         &["collector", "unknown"],
-        &["conclude", "given"],
+        &["given"],
+        &["code"],
+        &["conclude"],
     ]),
-    ("graph", &[&["elements", "graphs", "history", "per_element"], &["build", "diff", "window"]]),
+    ("graph", &[&["elements"], &["graphs"], &["diff", "history", "window"], &["windowed"]]),
     ("mission", &[&["event_log"], &["json", "phases"], &["events"], &["info"]]),
     ("view", &[
         &["options", "shown"],
@@ -98,7 +100,7 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
         &[
             "base/yaml",
             "evidence/source/qos",
-            "evidence/topology",
+            "evidence/given",
             "export/html",
             "gate/baseline",
             "gate/report",
@@ -502,7 +504,7 @@ const SPELLINGS: &[(&str, &[&str])] = &[
     ("{ \"s\" }", &[]),
     ("\"s\" } else", &[]),
     // An invisible character; names of characters that the font lacks are reported in a note.
-    ("escape_unicode", &["draw/picture", "evidence/topology"]),
+    ("escape_unicode", &["draw/picture"]),
     // A shortened name. Labels are cut by their width in the font, not by characters.
     ("'…'", &["draw/text", "export/report/escape"]),
     ("}…\"", &[]),

@@ -21,12 +21,26 @@ impl Id for u32 {
     }
 }
 
-/// Declares types of ids.
+/// The index itself, of things that have no type of ids: bags, streams.
+impl Id for usize {
+    fn of(at: usize) -> Self {
+        at
+    }
+
+    fn at(self) -> usize {
+        self
+    }
+}
+
+/// Declares types of ids, public ones unless another visibility comes first: `@pub(crate), Name`.
 macro_rules! ids {
-    ($($(#[$doc:meta])* $name:ident),* $(,)?) => {$(
+    ($($(#[$doc:meta])* $name:ident),* $(,)?) => {
+        $crate::base::ids::ids! { @pub, $($(#[$doc])* $name),* }
+    };
+    (@$vis:vis, $($(#[$doc:meta])* $name:ident),* $(,)?) => {$(
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-        pub struct $name(pub u32);
+        $vis struct $name($vis u32);
 
         impl $crate::base::ids::Id for $name {
             fn of(at: usize) -> Self {
@@ -112,6 +126,26 @@ impl<I: Id, T> ById<I, T> {
         T: Clone,
     {
         vec![value; other.len()].into()
+    }
+}
+
+impl<I: Id, T> ById<I, Option<T>> {
+    /// The value of an id, if it has one.
+    pub(crate) fn some(&self, id: I) -> Option<&T> {
+        self.get(id)?.as_ref()
+    }
+
+    /// Every value with its id.
+    pub(crate) fn somes(&self) -> impl Iterator<Item = (I, &T)> + Clone {
+        self.with_ids()
+            .filter_map(|(id, value)| Some((id, value.as_ref()?)))
+    }
+}
+
+impl<I: Id, T> ById<I, Vec<T>> {
+    /// The list of an id; empty beyond the end.
+    pub(crate) fn of(&self, id: I) -> &[T] {
+        self.get(id).map_or(&[], |list| list)
     }
 }
 

@@ -81,6 +81,21 @@ pub fn namespace(name: &str) -> &str {
     }
 }
 
+/// The full name of a topic as a node names it: `/tf` for all, `scan` in the node's namespace, `../map` in the one around
+/// that, `~/map` or `~map` below the node's name.
+pub(crate) fn resolved(topic: &str, node: &str) -> String {
+    let space = namespace(node);
+    if let Some(private) = topic.strip_prefix('~') {
+        format!("{node}/{}", private.trim_start_matches('/'))
+    } else if let Some(outer) = topic.strip_prefix("../") {
+        format!("{}/{outer}", namespace(space).trim_end_matches('/'))
+    } else if topic.starts_with('/') {
+        topic.to_owned()
+    } else {
+        format!("{}/{topic}", space.trim_end_matches('/'))
+    }
+}
+
 /// The last part of a resolved name; the whole name if that part would be empty.
 pub fn last_part(name: &str) -> &str {
     match name.rsplit('/').next() {

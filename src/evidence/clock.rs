@@ -1,23 +1,28 @@
-//! Credible times: a few messages far from all others were recorded with a clock that was not set.
+//! The clocks of recorders: credible times, as a few messages far from all others were recorded with a clock that was not set;
+//! and the differences between several recorders.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
 
 use crate::base::budget;
+use crate::base::ids::ById;
 use crate::base::rhythm::GAP_NS;
 use crate::base::time::{Span, Stamp};
+use crate::evidence::inference::Stream;
+use crate::evidence::observation::Observations;
 use crate::evidence::times::Calendar;
 
 pub(crate) const DAY: i64 = 86_400_000_000_000;
-/// The distance in days beyond which times count as far from all others.
+/// The distance in days beyond which times count as far from all others: no mission has a pause of a year.
 pub(crate) const FAR_DAYS: i64 = 365;
-/// The most far messages that are set aside, as one in so many messages.
+/// The most far messages that are set aside, as one in so many messages: more are no accident, but a clock that jumped.
 const RARE: u64 = 10;
 /// The days after 1970, ten years, that count as an unset clock: without a battery it begins there, and no robot
 /// recorded then.
 const UNSET_DAYS: i64 = 3652;
 
 /// Days without a gap of more than [`FAR_DAYS`] between them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 struct DayCluster {
     first: i64,
     last: i64,
@@ -25,7 +30,7 @@ struct DayCluster {
 }
 
 /// The assessment of the times of a mission.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Belief {
     /// The credible times, if some messages are far from the bulk; `None` if all are credible.
     pub(crate) span: Option<Span>,
@@ -37,12 +42,12 @@ pub(crate) struct Belief {
 
 /// Assesses the times of a mission by the messages of each bag: first each bag's, since each recorder has its own clock,
 /// then those of all clocks.
-pub(crate) fn believed(bags: &BTreeMap<usize, Calendar>) -> Belief {
+pub(crate) fn believed(bags: &ById<usize, Calendar>) -> Belief {
     let mut belief = Belief::default();
-    let own = bags.iter().filter_map(|(bag, all)| {
+    let own = bags.with_ids().filter_map(|(bag, all)| {
         let (kept, jump) = of_bag(all)?;
         belief.jumps.extend(jump);
-        Some((*bag, kept))
+        Some((bag, kept))
     });
     let mut own: Vec<(usize, DayCluster)> = own.collect();
     own.sort_by_key(|(_, kept)| kept.first);
@@ -55,7 +60,7 @@ pub(crate) fn believed(bags: &BTreeMap<usize, Calendar>) -> Belief {
     let (kept, others): (Vec<_>, Vec<_>) = own.into_iter().partition(|(_, own)| is_kept(own));
     belief.others = others.into_iter().map(|(bag, _)| bag).collect();
     let start = bulk.first.saturating_mul(DAY);
-    let begins_at_0 = kept.iter().any(|(bag, _)| begins_at_0(&bags[bag]));
+    let begins_at_0 = kept.iter().any(|(bag, _)| begins_at_0(&bags[*bag]));
     let span = Span::new(
         Stamp(if start == 0 && !begins_at_0 { 1 } else { start }),
         Stamp(bulk.last.saturating_add(1).saturating_mul(DAY)),
@@ -64,7 +69,7 @@ pub(crate) fn believed(bags: &BTreeMap<usize, Calendar>) -> Belief {
     let is_whole = |bag: &Calendar| {
         bag.days.keys().all(is_inside) && (bag.zeros == 0 || span.contains(Stamp(0)))
     };
-    belief.span = (!bags.values().all(is_whole)).then_some(span);
+    belief.span = (!bags.iter().all(is_whole)).then_some(span);
     belief
 }
 
@@ -131,7 +136,7 @@ fn clusters(all: impl Iterator<Item = DayCluster>) -> Vec<DayCluster> {
     clusters
 }
 
-/// The number of clusters that are listed.
+/// The number of clusters that are listed: a notice is one line.
 const NAMED: usize = 3;
 
 fn stated(clusters: &[DayCluster]) -> String {
@@ -150,108 +155,221 @@ fn stated(clusters: &[DayCluster]) -> String {
     )
 }
 
+// Differences between the clocks of several recorders, by the messages that two of them recorded.
+
+/// The fewest common messages that are significant: a few short ones may be equal by chance.
+const FEWEST: usize = 10;
+/// The fewest topics that must agree: a node may send the same sequence again.
+const TOPICS: usize = 2;
+/// The share, in per cent, of the messages in common that must agree about the offset; the others were delayed on their way.
+const SHARE: usize = 80;
+/// The largest difference between the offsets of two messages, in nanoseconds: they take different paths to
+/// the recorders.
+const NEAR_NS: i64 = 50_000_000;
+
+/// The offset of a recorder's clock.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ClockOffset {
+    /// The index of the bag among the inputs, and that of the one that it is compared with.
+    pub(crate) bag: usize,
+    pub(crate) other: usize,
+    /// The time by which its clock is ahead, in nanoseconds.
+    pub(crate) ahead: i64,
+    /// The number of messages that show it.
+    pub(crate) messages: usize,
+}
+
+/// The times of contents that occur once on a topic of a bag; `None` for those that occur more often.
+type Contents<'a> = BTreeMap<(&'a str, u32), Option<Stamp>>;
+
+/// The bags whose clocks differ from that of an earlier one.
+///
+/// # Errors
+/// If the temporary file of times cannot be read.
+pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Vec<ClockOffset>> {
+    let last = streams.iter().map(|stream| stream.bag).max();
+    let mut bags: Vec<Contents<'_>> = vec![Contents::new(); last.map_or(0, |last| last + 1)];
+    if bags.len() < 2 {
+        return Ok(Vec::new());
+    }
+    for (at, series) in facts.payloads.somes() {
+        let stream = &streams[at];
+        if stream.latched {
+            continue;
+        }
+        let contents = &mut bags[stream.bag];
+        facts.times.merge(&[*series], |timed| {
+            let key = (stream.connection.topic.as_str(), timed.size);
+            let time = contents.entry(key).or_insert(Some(timed.time));
+            *time = time.filter(|time| *time == timed.time);
+        })?;
+    }
+    let filled = (0..bags.len()).filter(|bag| !bags[*bag].is_empty());
+    let filled: Vec<usize> = filled.collect();
+    let mut found = Vec::new();
+    for (at, bag) in filled.iter().copied().enumerate() {
+        let mut before = filled[..at].iter().copied();
+        let apart = before.find_map(|other| Some((other, apart(&bags[other], &bags[bag])?)));
+        if let Some((other, (ahead, messages))) = apart
+            && ahead.abs() > NEAR_NS
+        {
+            found.push(ClockOffset {
+                bag,
+                other,
+                ahead,
+                messages,
+            });
+        }
+    }
+    Ok(found)
+}
+
+/// The delay of the common messages in the second recording, and their number; `None` without agreement.
+fn apart(one: &Contents<'_>, other: &Contents<'_>) -> Option<(i64, usize)> {
+    let both = other.iter().filter_map(|(key, time)| {
+        let before = one.get(key)?.as_ref()?;
+        Some((time.as_ref()?.since(*before), key.0))
+    });
+    let mut lags: Vec<(i64, &str)> = both.collect();
+    lags.sort_unstable();
+    let median = lags.get(lags.len() / 2)?.0;
+    let near = lags.iter().filter(|lag| (lag.0 - median).abs() <= NEAR_NS);
+    let agreeing = near.clone().count();
+    let topics: BTreeSet<&str> = near.map(|lag| lag.1).collect();
+    let is_clear = agreeing >= FEWEST && agreeing * 100 >= lags.len() * SHARE;
+    (is_clear && topics.len() >= TOPICS).then_some((median, agreeing))
+}
+
 #[cfg(test)]
 mod tests {
-    use super::*;
+    mod clock {
+        use super::super::*;
 
-    fn bag(days: &[(i64, u64)]) -> Calendar {
-        Calendar {
-            days: days.iter().copied().collect(),
-            ..Calendar::default()
+        fn bag(days: &[(i64, u64)]) -> Calendar {
+            Calendar {
+                days: days.iter().copied().collect(),
+                ..Calendar::default()
+            }
+        }
+
+        fn all(bags: &[Calendar]) -> Belief {
+            believed(&bags.iter().cloned().collect())
+        }
+
+        fn kept(days: &[(i64, u64)]) -> Option<(i64, i64)> {
+            let span = all(&[bag(days)]).span?;
+            Some((span.start.0.div_euclid(DAY), span.end.0 / DAY))
+        }
+
+        #[test]
+        fn each_bag_has_its_own_clock_and_most_messages_decide() {
+            let wall = bag(&[(20_000, 30)]);
+            let simulated = |many| bag(&[(0, many)]);
+            let span = |first: i64, last: i64| Some(Span::new(Stamp(first), Stamp(last * DAY)));
+            let found = all(&[wall.clone(), simulated(29)]);
+            assert_eq!(
+                (found.span, found.others),
+                (span(20_000 * DAY, 20_001), vec![1])
+            );
+            assert_eq!(all(&[wall.clone(), simulated(30)]).others, [1]);
+            let found = all(&[wall.clone(), simulated(31)]);
+            assert_eq!((found.span, found.others), (span(1, 1), vec![0]));
+            assert_eq!(found.jumps, [] as [&str; 0]);
+            assert_eq!(all(&[wall, bag(&[(20_300, 900)])]), Belief::default());
+        }
+
+        #[test]
+        fn messages_at_0_are_from_before_the_clock_unless_it_begins_there() {
+            let at_0 = |zeros, next| Calendar {
+                zeros,
+                next: Some(Stamp(next)),
+                ..bag(&[(0, 5)])
+            };
+            let late = at_0(900, 2 * GAP_NS);
+            assert_eq!(
+                all(std::slice::from_ref(&late)).span.unwrap().start,
+                Stamp(1)
+            );
+            assert_eq!(
+                all(&[late.clone(), bag(&[(0, 9)])]).span.unwrap().start,
+                Stamp(1)
+            );
+            assert_eq!(all(&[at_0(2, GAP_NS / 10)]), Belief::default());
+            assert_eq!(all(&[at_0(1, 2 * GAP_NS)]), Belief::default());
+            assert_eq!(all(&[late, at_0(2, 1)]), Belief::default());
+            let only = Calendar {
+                zeros: 3,
+                ..Calendar::default()
+            };
+            assert_eq!(all(&[only]), Belief::default());
+        }
+
+        #[test]
+        fn a_few_messages_far_from_the_bulk_are_set_aside() {
+            assert_eq!(kept(&[(0, 3), (20_000, 500)]), Some((20_000, 20_001)));
+            assert_eq!(kept(&[(0, 1), (20_000, 2)]), Some((20_000, 20_001)));
+            assert_eq!(kept(&[(0, 500), (20_000, 3)]), Some((0, 1)));
+        }
+
+        #[test]
+        fn a_bag_in_one_or_two_parts_is_kept_completely() {
+            assert_eq!(kept(&[(0, 500)]), None);
+            assert_eq!(kept(&[(20_000, 2), (20_006, 3)]), None);
+            assert_eq!(kept(&[(0, 250), (20_000, 250)]), None);
+            assert_eq!(kept(&[(0, 1), (20_000, 1)]), None);
+            assert_eq!(kept(&[]), None);
+        }
+
+        #[test]
+        fn messages_before_the_clock_was_set_are_set_aside() {
+            assert_eq!(kept(&[(0, 249), (20_000, 250)]), Some((20_000, 20_001)));
+            assert_eq!(kept(&[(10_957, 249), (20_000, 250)]), None);
+            assert_eq!(kept(&[(0, 250), (20_000, 249)]), None);
+        }
+
+        #[test]
+        fn missions_are_limited_to_a_hundred_years() {
+            assert_eq!(kept(&[(0, 2), (100_000, 2)]), Some((100_000, 100_001)));
+            assert_eq!(kept(&[(0, 3), (100_000, 2)]), Some((0, 1)));
+            let yearly: Vec<_> = (0..200).map(|year| (year * 365, 1)).collect();
+            assert_eq!(kept(&yearly), Some((0, budget::SPAN_DAYS)));
+        }
+
+        #[test]
+        fn a_plausible_clock_jump_is_reported() {
+            let stated = &all(&[bag(&[(10_957, 249), (20_000, 250)])]).jumps[0];
+            assert!(
+                stated.contains("249 messages from 2000-01-01, 250 messages from 2024-10-04"),
+                "{stated}"
+            );
+            let one = all(&[bag(&[(20_000, 249), (20_001, 250)])]);
+            assert_eq!(one, Belief::default());
         }
     }
 
-    fn all(bags: &[Calendar]) -> Belief {
-        believed(&bags.iter().cloned().enumerate().collect())
-    }
+    mod offsets {
+        use super::super::*;
 
-    fn kept(days: &[(i64, u64)]) -> Option<(i64, i64)> {
-        let span = all(&[bag(days)]).span?;
-        Some((span.start.0.div_euclid(DAY), span.end.0 / DAY))
-    }
+        fn contents(times: &[i64]) -> Contents<'static> {
+            let keys = (0..).map(|hash| (["/tf", "/odom"][hash as usize % 2], hash));
+            keys.zip(times.iter().map(|t| Some(Stamp(t * 1_000_000))))
+                .collect()
+        }
 
-    #[test]
-    fn each_bag_has_its_own_clock_and_most_messages_decide() {
-        let wall = bag(&[(20_000, 30)]);
-        let simulated = |many| bag(&[(0, many)]);
-        let span = |first: i64, last: i64| Some(Span::new(Stamp(first), Stamp(last * DAY)));
-        let found = all(&[wall.clone(), simulated(29)]);
-        assert_eq!(
-            (found.span, found.others),
-            (span(20_000 * DAY, 20_001), vec![1])
-        );
-        assert_eq!(all(&[wall.clone(), simulated(30)]).others, [1]);
-        let found = all(&[wall.clone(), simulated(31)]);
-        assert_eq!((found.span, found.others), (span(1, 1), vec![0]));
-        assert_eq!(found.jumps, [] as [&str; 0]);
-        assert_eq!(all(&[wall, bag(&[(20_300, 900)])]), Belief::default());
-    }
-
-    #[test]
-    fn messages_at_0_are_from_before_the_clock_unless_it_begins_there() {
-        let at_0 = |zeros, next| Calendar {
-            zeros,
-            next: Some(Stamp(next)),
-            ..bag(&[(0, 5)])
-        };
-        let late = at_0(900, 2 * GAP_NS);
-        assert_eq!(
-            all(std::slice::from_ref(&late)).span.unwrap().start,
-            Stamp(1)
-        );
-        assert_eq!(
-            all(&[late.clone(), bag(&[(0, 9)])]).span.unwrap().start,
-            Stamp(1)
-        );
-        assert_eq!(all(&[at_0(2, GAP_NS / 10)]), Belief::default());
-        assert_eq!(all(&[at_0(1, 2 * GAP_NS)]), Belief::default());
-        assert_eq!(all(&[late, at_0(2, 1)]), Belief::default());
-        let only = Calendar {
-            zeros: 3,
-            ..Calendar::default()
-        };
-        assert_eq!(all(&[only]), Belief::default());
-    }
-
-    #[test]
-    fn a_few_messages_far_from_the_bulk_are_set_aside() {
-        assert_eq!(kept(&[(0, 3), (20_000, 500)]), Some((20_000, 20_001)));
-        assert_eq!(kept(&[(0, 1), (20_000, 2)]), Some((20_000, 20_001)));
-        assert_eq!(kept(&[(0, 500), (20_000, 3)]), Some((0, 1)));
-    }
-
-    #[test]
-    fn a_bag_in_one_or_two_parts_is_kept_completely() {
-        assert_eq!(kept(&[(0, 500)]), None);
-        assert_eq!(kept(&[(20_000, 2), (20_006, 3)]), None);
-        assert_eq!(kept(&[(0, 250), (20_000, 250)]), None);
-        assert_eq!(kept(&[(0, 1), (20_000, 1)]), None);
-        assert_eq!(kept(&[]), None);
-    }
-
-    #[test]
-    fn messages_before_the_clock_was_set_are_set_aside() {
-        assert_eq!(kept(&[(0, 249), (20_000, 250)]), Some((20_000, 20_001)));
-        assert_eq!(kept(&[(10_957, 249), (20_000, 250)]), None);
-        assert_eq!(kept(&[(0, 250), (20_000, 249)]), None);
-    }
-
-    #[test]
-    fn missions_are_limited_to_a_hundred_years() {
-        assert_eq!(kept(&[(0, 2), (100_000, 2)]), Some((100_000, 100_001)));
-        assert_eq!(kept(&[(0, 3), (100_000, 2)]), Some((0, 1)));
-        let yearly: Vec<_> = (0..200).map(|year| (year * 365, 1)).collect();
-        assert_eq!(kept(&yearly), Some((0, budget::SPAN_DAYS)));
-    }
-
-    #[test]
-    fn a_plausible_clock_jump_is_reported() {
-        let stated = &all(&[bag(&[(10_957, 249), (20_000, 250)])]).jumps[0];
-        assert!(
-            stated.contains("249 messages from 2000-01-01, 250 messages from 2024-10-04"),
-            "{stated}"
-        );
-        let one = all(&[bag(&[(20_000, 249), (20_001, 250)])]);
-        assert_eq!(one, Belief::default());
+        #[test]
+        fn an_offset_needs_messages_that_agree() {
+            let one: Vec<i64> = (0..20).map(|n| n * 100).collect();
+            let later: Vec<i64> = one.iter().map(|t| t + 350 + t % 7).collect();
+            let (ahead, messages) = apart(&contents(&one), &contents(&later)).unwrap();
+            assert_eq!((ahead / 10_000_000, messages), (35, 20));
+            let wild: Vec<i64> = one.iter().map(|t| t * 2).collect();
+            assert_eq!(apart(&contents(&one), &contents(&wild)), None);
+            assert_eq!(apart(&contents(&one[..5]), &contents(&later)), None);
+            let only = |mut all: Contents<'static>| {
+                all.retain(|key, _| key.0 == "/tf");
+                all
+            };
+            assert_eq!(apart(&only(contents(&one)), &only(contents(&later))), None);
+        }
     }
 }

@@ -1,26 +1,28 @@
 //! A collector of any number of bags: the times of all messages, and the observations in their contents.
+//!
+//! In: bags, through a [`BagSink`] each. Out: [`Recorded`], everything that they contain about the graph.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::Arc;
 
-use crate::bag::{Connection, Message, Want};
+use crate::bag::straight::ClockFall;
+use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
 use crate::base::error::{Error, Result};
-use crate::base::name::is_log;
+use crate::base::ids::ById;
+use crate::base::name::{in_space, is_log};
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::time::Stamp;
-use crate::evidence::SOURCES;
-use crate::evidence::inference::Stream;
+use crate::base::time::{Span, Stamp};
+use crate::evidence::clock::{Belief, ClockOffset, believed, offsets};
+use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::message::cursor::PayloadCursor;
 use crate::evidence::message::dynamic::MessageSchema;
-use crate::evidence::numbers::Numbers;
+use crate::evidence::numbers::{Numbers, is_numbered};
 use crate::evidence::observation::{Observations, SourceId};
-use crate::evidence::source::equal_stamps::FirstHeader;
-use crate::evidence::source::{self, Read, SourceContext, echo, equal_stamps, payload};
+use crate::evidence::source::equal_stamps::{self, FirstHeader};
+use crate::evidence::source::{self, Read, SourceContext, echo, payload};
 use crate::evidence::times::Stamps;
-
-pub use recorded::Recorded;
-pub use sink::BagSink;
+use crate::evidence::{SOURCES, publishers};
 
 /// Options for reading.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -104,7 +106,7 @@ pub struct Collector {
     /// The schemas of all types and definitions.
     schemas: BTreeMap<[Arc<str>; 2], Arc<MessageSchema>>,
     /// The numbers in the headers of streams that have any, by index.
-    numbers: BTreeMap<usize, Numbers>,
+    numbers: ById<usize, Option<Numbers>>,
     /// The number of payload bytes compared so far.
     compared: u64,
     messages: Stamps,
@@ -221,54 +223,10 @@ impl Collector {
 
     /// Passes a message to the sources that know its layout.
     fn read(&mut self, place: usize, message: &Message<'_>) {
-        if let Some(numbers) = self.numbers.get_mut(&place) {
+        if let Some(Some(numbers)) = self.numbers.get_mut(place) {
             numbers.add(message.time, message.data);
         }
-        let stream = &self.streams[place];
-        if let Some(header) = self.layouts[place].header
-            && self.options.infer_stamps
-        {
-            let mut context = SourceContext {
-                facts: &mut self.facts,
-                space: &self.space,
-                stream,
-                place,
-                source: 0,
-                time: Some(message.time),
-            };
-            equal_stamps::collect(&mut context, header, message.data);
-        }
-        self.compare(place, message);
-        let stream = &self.streams[place];
         let layout = &self.layouts[place];
-        for (source, read) in &layout.readers {
-            let mut context = SourceContext {
-                facts: &mut self.facts,
-                space: &self.space,
-                stream,
-                place,
-                source: *source,
-                time: Some(message.time),
-            };
-            let done = PayloadCursor::new(&stream.connection.encoding, message.data)
-                .map(|payload| payload.numbered(layout.is_numbered))
-                .and_then(|mut payload| read.read(&mut context, &mut payload));
-            if done.is_err() {
-                self.notices
-                    .add(undecodable(stream, "some messages do not have its layout"));
-            }
-        }
-    }
-
-    /// Keeps the content of a payload for comparisons, as long as the budget lasts.
-    fn compare(&mut self, place: usize, message: &Message<'_>) {
-        let beginning = message.data.get(..payload::HEAD).unwrap_or(message.data);
-        self.compared = self
-            .compared
-            .saturating_add(beginning.len() as u64 + PAYLOAD_ENTRY);
-        if self.compared > self.options.payload_bytes {
-            return;
-        }
         let mut context = SourceContext {
             facts: &mut self.facts,
             space: &self.space,
@@ -277,22 +235,38 @@ impl Collector {
             source: 0,
             time: Some(message.time),
         };
-        // The number in the header is set by the publisher, even in a copy.
-        let own = if self.numbers.contains_key(&place) {
-            4
-        } else {
-            0
-        };
-        let compared = beginning.get(own..).unwrap_or_default();
-        payload::collect(&mut context, compared, message.size);
-        let layout = &self.layouts[place];
-        if let Some(header) = layout.header {
-            equal_stamps::age(&mut context, header, beginning);
-        }
-        if let Some(schema) = &layout.schema
-            && beginning.len() == message.size as usize
+        if let Some(header) = layout.header
+            && self.options.infer_stamps
         {
-            echo::keep(&mut context, schema, beginning);
+            equal_stamps::collect(&mut context, header, message.data);
+        }
+        // Payloads are compared as long as the budget lasts.
+        let beginning = message.data.get(..payload::HEAD).unwrap_or(message.data);
+        let cost = beginning.len() as u64 + PAYLOAD_ENTRY;
+        self.compared = self.compared.saturating_add(cost);
+        if self.compared <= self.options.payload_bytes {
+            // The number in the header is set by the publisher, even in a copy.
+            let is_numbered = self.numbers.some(place).is_some();
+            let own = beginning.get(if is_numbered { 4 } else { 0 }..);
+            payload::collect(&mut context, own.unwrap_or_default(), message.size);
+            if let Some(header) = layout.header {
+                equal_stamps::age(&mut context, header, beginning);
+            }
+            if let Some(schema) = &layout.schema
+                && beginning.len() == message.size as usize
+            {
+                echo::keep(&mut context, schema, beginning);
+            }
+        }
+        for (source, read) in &layout.readers {
+            context.source = *source;
+            let done = PayloadCursor::new(&context.stream.connection.encoding, message.data)
+                .map(|payload| payload.numbered(layout.is_numbered))
+                .and_then(|mut payload| read.read(&mut context, &mut payload));
+            if done.is_err() {
+                let why = "some messages do not have its layout";
+                self.notices.add(undecodable(context.stream, why));
+            }
         }
     }
 
@@ -303,7 +277,9 @@ impl Collector {
             let (streams, read) = (&self.streams, &self.read);
             let facts = &mut self.facts;
             for kept in [&mut facts.payloads, &mut facts.ages] {
-                kept.retain(|at, _| read.contains(&streams[*at].bag));
+                for (series, stream) in kept.iter_mut().zip(streams) {
+                    *series = series.filter(|_| read.contains(&stream.bag));
+                }
             }
         }
     }
@@ -355,9 +331,245 @@ pub(crate) fn spool_error(source: io::Error) -> Error {
     }
 }
 
-mod recorded;
-mod sink;
+/// A sink that feeds one bag into a [`Collector`].
+pub struct BagSink<'a> {
+    collector: &'a mut Collector,
+    progress: &'a mut dyn FnMut(u64, u64),
+    bag: usize,
+}
+
+impl BagSink<'_> {
+    fn stream(&self, connection: ConnectionId) -> Option<usize> {
+        let streams = self.collector.bags.get(self.bag)?;
+        streams.get(connection.0 as usize).copied()
+    }
+}
+
+impl Sink for BagSink<'_> {
+    fn connection(&mut self, connection: &Connection) -> Want {
+        let all = &mut *self.collector;
+        let topic = all
+            .facts
+            .name(&in_space(&all.space, connection.topic.as_str()));
+        let publisher = connection.publisher.as_ref();
+        let publisher = publisher.map(|p| in_space(&all.space, p.as_str()));
+        let stream = Stream {
+            bag: self.bag,
+            connection: connection.clone(),
+            topic,
+            publisher: publisher.map(|p| all.facts.name(&p)),
+            latched: is_held(connection),
+            trust: Reliability::Whole,
+            is_outside: false,
+            times: all.messages.series_of(self.bag),
+        };
+        let schema = all.schema(connection);
+        let (mut readers, foreign) = source::readers(&stream, &schema);
+        // It repeats the records of `/rosout` up to half a minute later, so that lists of topics would be out
+        // of order.
+        let own = all.bags.get(self.bag).into_iter().flatten();
+        let of = |name: &str| {
+            let streams = own.clone().copied();
+            let of = streams.filter(|at| all.streams[*at].connection.topic.as_str() == name);
+            of.collect::<Vec<usize>>()
+        };
+        match connection.topic.as_str() {
+            "/rosout_agg" if !of("/rosout").is_empty() => readers.clear(),
+            "/rosout" => of("/rosout_agg")
+                .into_iter()
+                .for_each(|at| all.layouts[at].readers.clear()),
+            _ => {}
+        }
+        if foreign {
+            all.notices
+                .add(undecodable(&stream, "its definition is not the known one"));
+        }
+        let header = equal_stamps::first_header(connection, &schema);
+        let stamped = all.options.infer_stamps && header.is_some();
+        let compared = all.options.payload_bytes > 0;
+        let want = all.options.want(!readers.is_empty(), stamped);
+        if want == Want::Payload || stamped {
+            all.read.insert(self.bag);
+        }
+        if is_numbered(connection, &schema) {
+            *all.numbers.grown(all.streams.len()) = Some(Numbers::default());
+        }
+        if let Some(streams) = all.bags.get_mut(self.bag) {
+            streams.push(all.streams.len());
+        }
+        all.streams.push(stream);
+        all.layouts.push(StreamLayout {
+            readers,
+            is_numbered: schema.numbers_headers(&connection.encoding),
+            header,
+            schema: echo::schema(&connection.type_name, &schema).filter(|_| compared),
+        });
+        all.announced();
+        want
+    }
+
+    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
+        if let Some(stream) = self.stream(connection) {
+            let times = self.collector.streams[stream].times;
+            self.collector.messages.add(times, stamps, sizes);
+        }
+    }
+
+    fn message(&mut self, message: Message<'_>) {
+        if let Some(stream) = self.stream(message.connection) {
+            self.collector.read(stream, &message);
+        }
+    }
+
+    fn notice(&mut self, notice: Notice) {
+        self.collector.notices.add(notice);
+    }
+
+    fn progress(&mut self, done: u64, total: u64) {
+        (self.progress)(done, total);
+    }
+}
+
+/// Everything that the bags of a mission contain about its graph.
+#[derive(Debug, Default)]
+pub struct Recorded {
+    pub(crate) streams: Vec<Stream>,
+    pub(crate) messages: Stamps,
+    /// The numbers in the headers of streams, by index, as far as they were read.
+    pub(crate) numbers: ById<usize, Option<Numbers>>,
+    pub(crate) facts: Observations,
+    /// Problems that did not stop the reading.
+    pub notices: Notices,
+    /// The points at which a recorder's clock went back, sorted by time.
+    pub(crate) falls: Vec<ClockFall>,
+    /// Whether runs overlap in time, since they could not be shifted.
+    pub(crate) overlaps: bool,
+    /// The differences between the clocks of several recorders.
+    pub(crate) offsets: Vec<ClockOffset>,
+    /// The time from the first log time to the last plus 1 ns, without messages at impossible times; `None` if there is
+    /// no message.
+    pub span: Option<Span>,
+}
+
+impl Recorded {
+    /// Judges the times and the names of publishers, once everything is collected.
+    fn judge(&mut self) -> io::Result<()> {
+        let belief = believed(self.messages.calendars());
+        let jumps = belief.jumps.iter();
+        let jumps = jumps.map(|text| Notice::new(NoticeKind::Note, text));
+        self.notices.extend(jumps);
+        // What is set aside may show by how much clocks differ.
+        self.offsets = offsets(&self.streams, &self.facts)?;
+        self.set_aside(&belief)?;
+        source::rosout::interpret_lists(&mut self.facts);
+        let (streams, facts) = (&mut self.streams, &mut self.facts);
+        let judged = publishers::judge(streams, facts, &mut self.messages, &self.numbers)?;
+        self.notices.extend(judged);
+        if self.facts.dropped > 0 {
+            let text = "there are implausibly many or long names: an observation was left out";
+            let dropped = self.facts.dropped;
+            self.notices
+                .add(Notice::counted(NoticeKind::Damaged, dropped, text));
+        }
+        self.facts.seal();
+        self.span = self.measure();
+        Ok(())
+    }
+
+    /// Removes the messages at incredible times, and notes the offsets of other clocks so that their first messages are
+    /// together.
+    fn set_aside(&mut self, belief: &Belief) -> io::Result<()> {
+        let Some(span) = belief.span else {
+            return Ok(());
+        };
+        let before = self.firsts();
+        let zeros = self.messages.calendars().iter().map(|bag| bag.zeros);
+        let zeros = if span.contains(Stamp(0)) {
+            0
+        } else {
+            zeros.sum()
+        };
+        let aside = self.clip(span)?;
+        let text = "message at time 0, before the clock was known, set aside";
+        self.notices
+            .add(Notice::counted(NoticeKind::Note, zeros, text));
+        let text = "message at an impossible time, set aside";
+        let far = aside.saturating_sub(zeros);
+        self.notices
+            .add(Notice::counted(NoticeKind::ImpossibleTime, far, text));
+        let firsts = self.firsts();
+        let kept = firsts.somes().min_by_key(|(_, first)| **first);
+        let offset = |bag: &usize| {
+            let ((other, start), first) = kept.zip(before.some(*bag))?;
+            Some(ClockOffset {
+                bag: *bag,
+                other,
+                ahead: first.since(*start),
+                messages: 0,
+            })
+        };
+        self.offsets.extend(belief.others.iter().filter_map(offset));
+        Ok(())
+    }
+
+    /// Removes the messages at other times than these, and everything that they state: they prove nothing. Returns their
+    /// number.
+    fn clip(&mut self, span: Span) -> io::Result<u64> {
+        let mut removed = 0;
+        for stream in &self.streams {
+            removed += self.messages.clip(stream.times, span)?;
+        }
+        self.facts.clip(span)?;
+        for (series, stream) in self.facts.headers.iter_mut().zip(&self.streams) {
+            *series = series.filter(|_| self.messages.count(stream.times) > 0);
+        }
+        self.numbers
+            .iter_mut()
+            .flatten()
+            .for_each(|own| own.clip(span));
+        Ok(removed)
+    }
+
+    /// Keeps a part of the recording, from its beginning on (`is_first`) or not.
+    ///
+    /// # Errors
+    /// If the temporary file of times cannot be read or written.
+    pub(crate) fn cut(&mut self, part: Span, is_first: bool) -> Result<()> {
+        self.clip(part).map_err(spool_error)?;
+        self.mark_outside(is_first);
+        self.span = self.measure();
+        Ok(())
+    }
+
+    /// The time of the first message of each bag with messages.
+    pub(crate) fn firsts(&self) -> ById<usize, Option<Stamp>> {
+        let mut firsts = ById::default();
+        for stream in &self.streams {
+            if let Some((first, _)) = self.messages.bounds(stream.times) {
+                let own: &mut Option<Stamp> = firsts.grown(stream.bag);
+                *own = Some(own.map_or(first, |own| first.min(own)));
+            }
+        }
+        firsts
+    }
+
+    /// Marks the streams without a message in the part of the recording that was read. In a part from the
+    /// beginning on, they have no latched message yet.
+    fn mark_outside(&mut self, is_first: bool) {
+        for stream in &mut self.streams {
+            stream.is_outside = self.messages.bounds(stream.times).is_none();
+            stream.latched &= !(stream.is_outside && is_first);
+        }
+    }
+
+    /// The span of all messages.
+    fn measure(&self) -> Option<Span> {
+        let bounds = self.streams.iter();
+        let bounds = bounds.filter_map(|stream| self.messages.bounds(stream.times));
+        let (first, last) = bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+        Some(Span::new(first, last.plus(1)))
+    }
+}
+
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod tests_ros2;

@@ -8,12 +8,15 @@ use std::sync::Arc;
 use super::collector::{Recorded, spool_error};
 use super::values::StatedValues;
 use crate::base::error::Result;
+use crate::base::ids::ById;
 use crate::base::name::{is_service, namespace};
 use crate::base::nearest::nearest;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::Stamp;
 #[cfg(feature = "source")]
 use crate::evidence::code::{Code, matching};
+use crate::evidence::given::substitution::ANONYMOUS;
+use crate::evidence::given::{NamedElement, Topology, TopologyEntry};
 use crate::evidence::inference::{
     Conclusions, ElementKey, Incident, IncidentKind, Inference, Stream, Validity, offers,
 };
@@ -21,8 +24,6 @@ use crate::evidence::observation::{Measurement, Name};
 use crate::evidence::source::contract::Owners;
 use crate::evidence::source_id;
 use crate::evidence::times::Stamps;
-use crate::evidence::topology::substitution::ANONYMOUS;
-use crate::evidence::topology::{NamedElement, Topology, TopologyEntry};
 use crate::evidence::{Confidence, EvidenceLine, SOURCES, unknown};
 
 /// Additions to the contents of the bags.
@@ -52,10 +53,10 @@ pub struct Findings {
     pub(crate) measured: Vec<Measurement>,
     /// Stated values of elements: types, states, quality of service.
     pub(crate) values: StatedValues,
-    /// The number of publishers that the bags count on each topic.
-    pub(crate) offers: BTreeMap<Name, u32>,
+    /// The number of publishers that the bags count on each topic; 0 if unknown.
+    pub(crate) offers: ById<Name, u32>,
     /// The texts of all names.
-    names: Vec<Arc<str>>,
+    names: ById<Name, Arc<str>>,
     /// Every piece of evidence for [`super::collector::CollectOptions::why`], in order of time, source and text.
     pub lines: Vec<EvidenceLine>,
     /// Notices about the user's files.
@@ -67,7 +68,7 @@ pub struct Findings {
 impl Findings {
     /// The text of a name.
     pub(crate) fn text(&self, name: Name) -> Arc<str> {
-        let text = self.names.get(name.0 as usize);
+        let text = self.names.get(name);
         text.map_or_else(|| "".into(), Arc::clone)
     }
 }
@@ -102,7 +103,7 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
     });
     inferences.shrink_to_fit();
     let new = facts.renumber();
-    let to = |name: Name| new.get(name.0 as usize).copied().unwrap_or(name);
+    let to = |name: Name| new.get(name).copied().unwrap_or(name);
     for inference in &mut inferences {
         inference.rename(&to);
     }

@@ -1,25 +1,20 @@
 //! Inferences from the observations of a mission: the evidence for each node, topic and edge.
 
-mod at_word;
-mod closed;
-mod incident;
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::Arc;
 
 use crate::bag::{Connection, Encoding};
+use crate::base::ids::ById;
 use crate::base::name::{is_log, plain_type};
-use crate::base::time::Stamp;
-use crate::evidence::inference::closed::Closed;
+use crate::base::rhythm::CLOSE_NS;
+use crate::base::time::{Span, Stamp};
 use crate::evidence::message::log::is_ros1_log;
 use crate::evidence::observation::{
     Confidence, EvidenceLine, Name, Observation, ObservationRecord, Observations, SourceId,
 };
-use crate::evidence::source_word;
 use crate::evidence::times::SeriesId;
-
-pub(crate) use incident::{Incident, IncidentKind};
+use crate::evidence::{SOURCES, source_word};
 
 /// A connection of one of the bags.
 #[derive(Clone, Debug)]
@@ -56,7 +51,7 @@ pub(crate) enum Reliability {
 }
 
 /// A node, a topic or an edge.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum ElementKey {
     Node(Name),
     Topic(Name),
@@ -88,7 +83,7 @@ impl ElementKey {
 }
 
 /// The times during which an inference is valid.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug)]
 pub(crate) enum Validity {
     /// While there are messages of this stream.
     Messages(usize),
@@ -111,7 +106,7 @@ pub(crate) enum Validity {
 }
 
 /// A piece of evidence for an element.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Inference {
     pub(crate) what: ElementKey,
     pub(crate) source: SourceId,
@@ -160,7 +155,7 @@ fn gone(streams: &[Stream]) -> BTreeSet<Option<Name>> {
 }
 
 /// Everything known about a mission once all bags are read, and the conclusions so far.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Conclusions<'a> {
     pub(crate) streams: &'a [Stream],
     pub(crate) facts: Observations,
@@ -176,22 +171,22 @@ pub(crate) struct Conclusions<'a> {
     /// The publishers that may have stopped, or not have started, in the part of the recording that is read.
     pub(crate) gone: BTreeSet<Option<Name>>,
     /// The streams of each topic.
-    recorded: BTreeMap<Name, Vec<usize>>,
+    recorded: ById<Name, Vec<usize>>,
     /// The number of publishers of each topic when its recording began.
-    offers: BTreeMap<Name, u32>,
+    offers: ById<Name, u32>,
     /// The error of reading times, if any.
     pub(crate) failed: Option<io::Error>,
-    publishers: BTreeMap<Name, BTreeSet<Name>>,
-    subscribers: BTreeMap<Name, BTreeSet<Name>>,
+    publishers: ById<Name, BTreeSet<Name>>,
+    subscribers: ById<Name, BTreeSet<Name>>,
     nodes: BTreeSet<Name>,
     closed: Option<Closed>,
 }
 
 impl<'a> Conclusions<'a> {
     pub(crate) fn new(streams: &'a [Stream], facts: Observations, mission: (Stamp, Stamp)) -> Self {
-        let mut recorded: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
+        let mut recorded: ById<Name, Vec<usize>> = ById::default();
         for (at, stream) in streams.iter().enumerate() {
-            recorded.entry(stream.topic).or_default().push(at);
+            recorded.grown(stream.topic).push(at);
         }
         Self {
             mission,
@@ -210,10 +205,10 @@ impl<'a> Conclusions<'a> {
         self.nodes.extend(node);
         match inference.what {
             ElementKey::Subscribe(topic, node) => {
-                self.subscribers.entry(topic).or_default().insert(node);
+                self.subscribers.grown(topic).insert(node);
             }
             ElementKey::Publish(node, topic) => {
-                self.publishers.entry(topic).or_default().insert(node);
+                self.publishers.grown(topic).insert(node);
             }
             ElementKey::Node(_) | ElementKey::Topic(_) => {}
         }
@@ -269,7 +264,7 @@ impl<'a> Conclusions<'a> {
         if self.knows(what) || self.denies(what) {
             return;
         }
-        for at in self.recorded.get(&topic).cloned().unwrap_or_default() {
+        for at in self.recorded.of(topic).to_vec() {
             if self.streams[at].publisher.is_none() {
                 let when = Validity::Messages(at);
                 let inference = Inference::new(source, what, Confidence::Inferred, when);
@@ -315,12 +310,12 @@ impl<'a> Conclusions<'a> {
 
     /// Whether a bag has a connection of this topic, even without messages.
     pub(crate) fn is_recorded(&self, topic: Name) -> bool {
-        self.recorded.contains_key(&topic)
+        !self.recorded.of(topic).is_empty()
     }
 
     /// The type of a recorded topic in the form of ROS 1, without `/msg`; empty if no bag states it.
     pub(crate) fn kind(&self, topic: Name) -> String {
-        let first = self.recorded.get(&topic).and_then(|all| all.first());
+        let first = self.recorded.of(topic).first();
         first.map_or_else(String::new, |at| {
             plain_type(&self.streams[*at].connection.type_name).into_owned()
         })
@@ -328,7 +323,7 @@ impl<'a> Conclusions<'a> {
 
     /// The number of publishers of a topic when its recording began; `None` if unknown.
     pub(crate) fn offers(&self, topic: Name) -> Option<u32> {
-        self.offers.get(&topic).copied()
+        self.offers.get(topic).copied().filter(|many| *many > 0)
     }
 
     /// The known node that a logger belongs to: the one of its name, or the nearest above it in the namespaces.
@@ -353,30 +348,30 @@ impl<'a> Conclusions<'a> {
 
     /// The nodes known so far to publish `topic`.
     pub(crate) fn publishers(&self, topic: Name) -> impl Iterator<Item = Name> + '_ {
-        self.publishers.get(&topic).into_iter().flatten().copied()
+        self.publishers.get(topic).into_iter().flatten().copied()
     }
 
-    /// The nodes known so far to subscribe to `topic`.
     /// The publisher of a topic, if it is known to be a single one.
     pub(crate) fn only_publisher(&self, topic: Name) -> Option<Name> {
         let mut all = self.publishers(topic);
         all.next().filter(|_| all.next().is_none())
     }
 
+    /// The nodes known so far to subscribe to `topic`.
     pub(crate) fn subscribers(&self, topic: Name) -> impl Iterator<Item = Name> + '_ {
-        self.subscribers.get(&topic).into_iter().flatten().copied()
+        self.subscribers.get(topic).into_iter().flatten().copied()
     }
 
     /// All subscriptions known so far, as topic and node.
     pub(crate) fn subscriptions(&self) -> impl Iterator<Item = (Name, Name)> + '_ {
-        let all = self.subscribers.iter();
-        all.flat_map(|(topic, nodes)| nodes.iter().map(move |node| (*topic, *node)))
+        let all = self.subscribers.with_ids();
+        all.flat_map(|(topic, nodes)| nodes.iter().map(move |node| (topic, *node)))
     }
 
     /// All publications known so far, as node and topic.
     pub(crate) fn publications(&self) -> impl Iterator<Item = (Name, Name)> + '_ {
-        let all = self.publishers.iter();
-        all.flat_map(|(topic, nodes)| nodes.iter().map(move |node| (*node, *topic)))
+        let all = self.publishers.with_ids();
+        all.flat_map(|(topic, nodes)| nodes.iter().map(move |node| (*node, topic)))
     }
 
     /// Every node known so far.
@@ -416,11 +411,8 @@ impl<'a> Conclusions<'a> {
         basis: Name,
         topic: Name,
     ) {
-        self.like(
-            source,
-            ElementKey::Subscribe(topic, node),
-            ElementKey::Publish(node, basis),
-        );
+        let basis = ElementKey::Publish(node, basis);
+        self.like(source, ElementKey::Subscribe(topic, node), basis);
     }
 
     /// The names of all known nodes and loggers.
@@ -465,14 +457,354 @@ impl<'a> Conclusions<'a> {
     }
 }
 
-/// The largest number of publishers that offered each topic in one bag.
-pub(crate) fn offers(of_streams: &BTreeMap<usize, u32>, streams: &[Stream]) -> BTreeMap<Name, u32> {
-    let mut offers: BTreeMap<Name, u32> = BTreeMap::new();
-    for (at, count) in of_streams {
-        if let Some(stream) = streams.get(*at) {
-            let most = offers.entry(stream.topic).or_default();
-            *most = (*most).max(*count);
-        }
+/// The largest number of publishers that offered each topic in one bag; 0 if unknown.
+pub(crate) fn offers(of_streams: &ById<usize, u32>, streams: &[Stream]) -> ById<Name, u32> {
+    let mut offers: ById<Name, u32> = ById::default();
+    for (count, stream) in of_streams.iter().zip(streams) {
+        let most = offers.grown(stream.topic);
+        *most = (*most).max(*count);
     }
     offers
+}
+
+// Observations taken literally, with their times: signs, and ends by observations that revoke them.
+
+impl Conclusions<'_> {
+    /// All observations of one source with their signs and ends, sorted.
+    pub(crate) fn observations(
+        &mut self,
+        source: SourceId,
+    ) -> Vec<(ObservationRecord, Vec<Stamp>, Vec<Stamp>)> {
+        let endings = self.endings();
+        let facts = self.observed(source).into_iter();
+        let times = |fact: ObservationRecord| {
+            let (signs, ends) = self.signs_and_ends(&fact, &endings);
+            (fact, signs, ends)
+        };
+        facts.map(times).collect()
+    }
+
+    /// Adds the inferences that follow from single observations without a rule: nodes, topics, publications
+    /// and subscriptions.
+    pub(crate) fn take_at_their_word(&mut self) {
+        let endings = self.endings();
+        let facts = self.facts.list.iter();
+        let records = facts.filter_map(|fact| match fact.observation {
+            Observation::Node(node) => {
+                Some(((fact.source, node), self.facts.times.count(fact.times)))
+            }
+            _ => None,
+        });
+        let records: BTreeMap<(SourceId, Name), u64> = records.collect();
+        for fact in self.facts.list.clone() {
+            let what = match fact.observation {
+                Observation::Node(node) | Observation::Begins(node) => ElementKey::Node(node),
+                Observation::Topic(topic) => ElementKey::Topic(topic),
+                Observation::Publish(node, topic) => ElementKey::Publish(node, topic),
+                Observation::Subscribe(node, topic)
+                | Observation::Joins(node, topic)
+                | Observation::Refused(node, topic) => ElementKey::Subscribe(topic, node),
+                _ => continue,
+            };
+            let (mut signs, ends) = self.signs_and_ends(&fact, &endings);
+            if let Observation::Joins(node, topic) = fact.observation
+                && let Some(refused) = endings.get(&Observation::Refused(node, topic))
+            {
+                signs.retain(|sign| !is_refused(*sign, refused));
+            }
+            if signs.is_empty() && matches!(fact.observation, Observation::Joins(..)) {
+                continue;
+            }
+            // If every record has the first number, sequence numbers are unused.
+            if let Observation::Begins(node) = fact.observation
+                && signs.len() > 1
+                && records.get(&(fact.source, node)) == Some(&(signs.len() as u64))
+            {
+                continue;
+            }
+            let when = match fact.observation {
+                Observation::Joins(..) | Observation::Begins(_) => Validity::Begins { signs, ends },
+                Observation::Refused(..) => Validity::Moments(signs),
+                _ => Validity::Signs { signs, ends },
+            };
+            self.add(Inference::new(fact.source, what, fact.confidence, when));
+        }
+    }
+
+    /// The times at which observations were revoked, those of refusals and those of snapshots, sorted.
+    fn endings(&mut self) -> BTreeMap<Observation, Vec<Stamp>> {
+        let mut endings: BTreeMap<Observation, Vec<Stamp>> = BTreeMap::new();
+        for fact in self.facts.list.clone() {
+            if let Observation::NodeGone(_)
+            | Observation::Unsubscribe(..)
+            | Observation::Refused(..)
+            | Observation::Snapshot(_) = fact.observation
+            {
+                let times = self.times(&fact);
+                endings.entry(fact.observation).or_default().extend(times);
+            }
+        }
+        for times in endings.values_mut() {
+            times.sort_unstable();
+        }
+        endings
+    }
+
+    /// The times at which an observation was made, and at which it was revoked, sorted.
+    fn signs_and_ends(
+        &mut self,
+        fact: &ObservationRecord,
+        endings: &BTreeMap<Observation, Vec<Stamp>>,
+    ) -> (Vec<Stamp>, Vec<Stamp>) {
+        let mut signs = self.times(fact);
+        let ending = match fact.observation {
+            Observation::Node(node) => Some(Observation::NodeGone(node)),
+            Observation::Subscribe(node, topic)
+            | Observation::Joins(node, topic)
+            | Observation::SaysSubscribe(node, topic) => {
+                Some(Observation::Unsubscribe(node, topic))
+            }
+            _ => None,
+        };
+        let mut ends = ending
+            .and_then(|e| endings.get(&e))
+            .cloned()
+            .unwrap_or_default();
+        let snapshots = fact
+            .snapshot
+            .and_then(|name| endings.get(&Observation::Snapshot(name)));
+        if let Some(taken) = snapshots {
+            let mut absent = absences(&signs, taken);
+            if SOURCES.get(fact.source).is_some_and(|source| source.holds) {
+                hold(&mut signs, taken);
+                hold(&mut absent, taken);
+            }
+            ends.extend(absent);
+        }
+        ends.sort_unstable();
+        ends.dedup();
+        (signs, ends)
+    }
+}
+
+/// Extends snapshots that show an element to the last moments before the next ones.
+fn hold(times: &mut Vec<Stamp>, snapshots: &[Stamp]) {
+    let next = |time: &Stamp| snapshots.get(snapshots.partition_point(|t| t <= time));
+    let last: Vec<Stamp> = times
+        .iter()
+        .filter_map(next)
+        .map(|next| next.plus(-1))
+        .collect();
+    times.extend(last);
+    times.sort_unstable();
+    times.dedup();
+}
+
+/// The longest time from a client's connection to its refusal, in nanoseconds: both are logged together.
+const REFUSED_NS: i64 = 1_000_000_000;
+
+/// Whether a connection made at `time` was refused at once.
+fn is_refused(time: Stamp, refusals: &[Stamp]) -> bool {
+    let soon = |refusal: &Stamp| (0..=REFUSED_NS).contains(&refusal.since(time));
+    refusals.iter().any(soon)
+}
+
+/// The snapshots that show an absence: the first and the last of each run without the observation. Both lists are sorted.
+fn absences(signs: &[Stamp], snapshots: &[Stamp]) -> Vec<Stamp> {
+    let mut absent = Vec::new();
+    let mut from = 0;
+    for sign in signs {
+        let run = &snapshots[from..snapshots.partition_point(|t| t < sign).max(from)];
+        absent.extend(run.first());
+        absent.extend(run.last());
+        from = snapshots.partition_point(|t| t <= sign);
+    }
+    absent.extend(snapshots.get(from));
+    absent
+}
+
+// Edges known not to exist: a complete list of a node's edges omits them.
+
+/// Complete lists of the topics that nodes publish and subscribe to, if there are any.
+#[derive(Default)]
+pub(crate) struct Closed {
+    /// By node: all topics that a rospy node names as its own, or all that a snapshot of the graph shows for
+    /// a node.
+    all: ById<Name, BTreeSet<Name>>,
+    /// By node: all topics that a roscpp node publishes.
+    published: ById<Name, BTreeSet<Name>>,
+    /// Nodes whose lists were repeated long after the first: a list made at a node's start may lack later topics.
+    settled: BTreeSet<Name>,
+    /// Topics on which every message names its publisher, with all these publishers.
+    stated: ById<Name, BTreeSet<Name>>,
+}
+
+impl Closed {
+    pub(crate) fn new(known: &Conclusions<'_>) -> Self {
+        let mut closed = Self::default();
+        let mut times: ById<Name, Option<Span>> = ById::default();
+        for fact in &known.facts.list {
+            let listed = fact.snapshot.is_some();
+            let word = source_word(fact.source);
+            if let (
+                Observation::Lists(node, _) | Observation::Publish(node, _),
+                Some((first, last)),
+                true,
+            ) = (
+                fact.observation,
+                known.facts.times.bounds(fact.times),
+                listed,
+            ) {
+                let span = times.grown(node).get_or_insert(Span::new(first, last));
+                span.start = span.start.min(first);
+                span.end = span.end.max(last);
+            }
+            match (fact.observation, word) {
+                (Observation::Lists(node, topic), _)
+                | (
+                    Observation::Publish(node, topic) | Observation::Subscribe(node, topic),
+                    "rosgraph",
+                ) => {
+                    closed.all.grown(node).insert(topic);
+                }
+                (Observation::Publish(node, topic), "rosout") if listed => {
+                    closed.published.grown(node).insert(topic);
+                }
+                _ => {}
+            }
+        }
+        let settled = times.somes().filter(|(_, span)| span.nanos() >= SETTLED_NS);
+        closed.settled = settled.map(|(node, _)| node).collect();
+        closed.fill(known);
+        closed
+    }
+
+    fn fill(&mut self, known: &Conclusions<'_>) {
+        let mut unnamed = Vec::new();
+        for stream in known.streams {
+            match stream.publisher {
+                Some(node) if stream.trust == Reliability::Whole => {
+                    self.stated.grown(stream.topic).insert(node);
+                }
+                _ => {
+                    unnamed.push(stream.topic);
+                }
+            }
+        }
+        for topic in unnamed {
+            self.stated.grown(topic).clear();
+        }
+    }
+
+    /// Whether every message of a topic names its publisher, and this node is never named.
+    pub(crate) fn headers_deny(&self, what: ElementKey) -> bool {
+        match what {
+            ElementKey::Publish(node, topic) => lacks(&self.stated, topic, node),
+            _ => false,
+        }
+    }
+
+    /// Whether a complete list that was made long after its node's start omits this edge.
+    pub(crate) fn settled_lists_deny(&self, what: ElementKey) -> bool {
+        let node = match what {
+            ElementKey::Publish(node, _) | ElementKey::Subscribe(_, node) => node,
+            ElementKey::Node(_) | ElementKey::Topic(_) => return false,
+        };
+        self.settled.contains(&node) && self.lists_deny(what)
+    }
+
+    /// Whether a complete list omits this edge; false for nodes and topics.
+    pub(crate) fn lists_deny(&self, what: ElementKey) -> bool {
+        match what {
+            ElementKey::Publish(node, topic) => {
+                lacks(&self.all, node, topic) || lacks(&self.published, node, topic)
+            }
+            ElementKey::Subscribe(topic, node) => lacks(&self.all, node, topic),
+            ElementKey::Node(_) | ElementKey::Topic(_) => false,
+        }
+    }
+}
+
+/// The time after a node's start at which it has made its connections, in nanoseconds; a list made
+/// earlier may lack some.
+const SETTLED_NS: i64 = 5_000_000_000;
+
+/// Whether there is a list for `of` without `member`.
+fn lacks(lists: &ById<Name, BTreeSet<Name>>, of: Name, member: Name) -> bool {
+    let list = lists.get(of).filter(|list| !list.is_empty());
+    list.is_some_and(|list| !list.contains(&member))
+}
+
+// Statements about the graph other than about which elements exist.
+
+/// The kind of an incident, with what is stated about it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum IncidentKind {
+    /// A subscriber receives nothing, because this policy of its quality of service is incompatible; empty if none is named.
+    Starved(Arc<str>),
+    /// Two nodes have the same name.
+    Duplicate,
+    /// The recorder lost so many messages.
+    Lost(u64),
+    /// A node that forwarded the messages of one topic now forwards those of another.
+    Turn(Name, Name),
+}
+
+/// A statement about an element.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Incident {
+    pub(crate) what: ElementKey,
+    pub(crate) kind: IncidentKind,
+    pub(crate) source: SourceId,
+    pub(crate) time: Stamp,
+    /// The time of the last statement of a run of equal ones.
+    pub(crate) until: Option<Stamp>,
+}
+
+impl Conclusions<'_> {
+    /// Adds an incident; one shortly after another of its kind about the same element is merged with it.
+    pub(crate) fn incident(
+        &mut self,
+        source: SourceId,
+        what: ElementKey,
+        kind: IncidentKind,
+        time: Stamp,
+    ) {
+        let own = |old: &&mut Incident| old.what == what && (old.source == source);
+        if let Some(last) = self.incidents.iter_mut().rev().find(own)
+            && time.since(last.until.unwrap_or(last.time)) <= CLOSE_NS
+        {
+            let is_same = match (&mut last.kind, &kind) {
+                (IncidentKind::Lost(all), IncidentKind::Lost(more)) => {
+                    *all = all.saturating_add(*more);
+                    true
+                }
+                (old, new) => old == new,
+            };
+            if is_same {
+                last.until = Some(time).filter(|time| *time > last.time);
+                return;
+            }
+        }
+        self.incidents.push(Incident {
+            what,
+            kind,
+            source,
+            time,
+            until: None,
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_claim_missing_in_a_snapshot_is_an_absence() {
+        let stamps = |times: &[i64]| times.iter().map(|t| Stamp(*t)).collect::<Vec<_>>();
+        let absent = absences(&stamps(&[4, 8]), &stamps(&[1, 2, 3, 4, 5, 6, 7, 8, 9]));
+        assert_eq!(absent, stamps(&[1, 3, 5, 7, 9]));
+        assert_eq!(absences(&stamps(&[1, 2]), &stamps(&[1, 2])), []);
+    }
 }

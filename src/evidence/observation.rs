@@ -9,10 +9,10 @@ use std::io;
 use std::sync::Arc;
 
 use crate::base::budget;
+use crate::base::ids::{ById, ids};
 use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
 use crate::evidence::source_word;
-use crate::evidence::texts::LoggedTexts;
 use crate::evidence::times::{SeriesId, Stamps};
 
 worded! {
@@ -31,9 +31,11 @@ worded! {
     }
 }
 
-/// The number of a text in the mission: the name of a node or topic, a type, a state.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) struct Name(pub(crate) u32);
+ids! {
+    @pub(crate),
+    /// The number of a text in the mission: the name of a node or topic, a type, a state.
+    Name,
+}
 
 /// Declares the kinds of observations with the names in each.
 macro_rules! observations {
@@ -186,16 +188,16 @@ pub(crate) struct Observations {
     pub(crate) watched: Vec<String>,
     pub(crate) pieces: Vec<EvidenceLine>,
     /// The header stamps of streams, by the streams' indices; log times are stored in place of sizes.
-    pub(crate) headers: BTreeMap<usize, SeriesId>,
+    pub(crate) headers: ById<usize, Option<SeriesId>>,
     /// The ages of messages by their header stamps, by the streams' indices; stored in place of sizes
     /// ([`age_of`]).
-    pub(crate) ages: BTreeMap<usize, SeriesId>,
+    pub(crate) ages: ById<usize, Option<SeriesId>>,
     /// Statistics, in the order in which they were read.
     pub(crate) measured: Vec<Measurement>,
     /// The hashes of payloads, by the streams' indices; stored in place of sizes.
-    pub(crate) payloads: BTreeMap<usize, SeriesId>,
-    /// The number of publishers that offer each stream, by the streams' indices.
-    pub(crate) offers: BTreeMap<usize, u32>,
+    pub(crate) payloads: ById<usize, Option<SeriesId>>,
+    /// The number of publishers that offer each stream, by the streams' indices; 0 if unknown.
+    pub(crate) offers: ById<usize, u32>,
     /// Texts that nodes log, and texts in messages.
     pub(crate) logged: LoggedTexts,
     /// The namespaces of recordings; empty for one without.
@@ -203,7 +205,7 @@ pub(crate) struct Observations {
     /// Nodes with a log record from a Python file, until their lists are interpreted.
     pub(crate) rospy: BTreeSet<Name>,
     ids: HashMap<Arc<str>, Name>,
-    texts: Vec<Arc<str>>,
+    texts: ById<Name, Arc<str>>,
     /// The number of bytes of all texts.
     bytes: usize,
     places: HashMap<(Observation, SourceId, Option<Name>), usize>,
@@ -240,22 +242,17 @@ impl Observations {
         {
             return self.overflow();
         }
-        let name = Name(u32::try_from(self.texts.len()).unwrap_or(u32::MAX));
         self.bytes = bytes;
         let text: Arc<str> = text.into();
-        self.texts.push(Arc::clone(&text));
+        let name = self.texts.push(Arc::clone(&text));
         self.ids.insert(text, name);
         name
     }
 
     /// The name that replaces all texts beyond the limit; no observation about it is kept.
     fn overflow(&mut self) -> Name {
-        let name = Name(u32::try_from(self.texts.len()).unwrap_or(u32::MAX));
         let texts = &mut self.texts;
-        *self.overflow.get_or_insert_with(|| {
-            texts.push("".into());
-            name
-        })
+        *self.overflow.get_or_insert_with(|| texts.push("".into()))
     }
 
     /// The name of a known text.
@@ -265,9 +262,8 @@ impl Observations {
 
     /// The text of a name.
     pub(crate) fn text(&self, name: Name) -> Arc<str> {
-        self.texts
-            .get(name.0 as usize)
-            .map_or_else(|| "".into(), Arc::clone)
+        let text = self.texts.get(name);
+        text.map_or_else(|| "".into(), Arc::clone)
     }
 
     /// Adds an observation by `source`, at `time` if it has one; keeps its explanation if `why` requests its names.
@@ -341,7 +337,7 @@ impl Observations {
         let Some(times) = Arc::get_mut(&mut self.times) else {
             return Ok(());
         };
-        for series in self.payloads.values().chain(self.ages.values()) {
+        for series in self.payloads.iter().chain(&self.ages).flatten() {
             times.clip(*series, span)?;
         }
         let mut left = Vec::new();
@@ -400,14 +396,14 @@ impl Observations {
     }
 
     /// Numbers all names in the order of their texts; returns the new number of each old one.
-    pub(crate) fn renumber(&mut self) -> Vec<Name> {
-        let mut order: Vec<usize> = (0..self.texts.len()).collect();
+    pub(crate) fn renumber(&mut self) -> ById<Name, Name> {
+        let mut order: Vec<Name> = self.texts.ids().collect();
         order.sort_by(|a, b| self.texts[*a].cmp(&self.texts[*b]));
-        let mut new = vec![Name(0); order.len()];
-        for (rank, old) in (0..).zip(&order) {
-            new[*old] = Name(rank);
+        let mut new = ById::like(&self.texts, Name(0));
+        for (rank, old) in (0..).map(Name).zip(&order) {
+            new[*old] = rank;
         }
-        let to = |name: Name| new.get(name.0 as usize).copied().unwrap_or(name);
+        let to = |name: Name| new.get(name).copied().unwrap_or(name);
         self.texts = order
             .iter()
             .map(|old| Arc::clone(&self.texts[*old]))
@@ -428,7 +424,7 @@ impl Observations {
     }
 
     /// The texts of all names, by their numbers.
-    pub(crate) fn into_texts(self) -> Vec<Arc<str>> {
+    pub(crate) fn into_texts(self) -> ById<Name, Arc<str>> {
         self.texts
     }
 
@@ -449,18 +445,18 @@ pub(crate) fn age_of(kept: u32) -> i64 {
 /// Adds a time with its number to the series of a stream.
 fn note(
     times: &mut Arc<Stamps>,
-    series: &mut BTreeMap<usize, SeriesId>,
+    series: &mut ById<usize, Option<SeriesId>>,
     place: usize,
     (time, number): (Stamp, u32),
 ) {
     if let Some(times) = Arc::get_mut(times) {
-        let id = *series.entry(place).or_insert_with(|| times.series());
+        let id = *series.grown(place).get_or_insert_with(|| times.series());
         times.add(id, &[time], Some(&[number]));
     }
 }
 
 /// An observation with everything that belongs to it except its source and time.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) struct Statement {
     pub(crate) observation: Observation,
     pub(crate) confidence: Confidence,
@@ -478,45 +474,153 @@ impl Statement {
     }
 }
 
+// Log texts of nodes and values of small messages, kept together so that a log text that repeats a message
+// can be found. Bounded: beyond the limit, the first are kept.
+
+/// A text of a logger.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct LoggedText {
+    pub(crate) time: Stamp,
+    pub(crate) logger: Arc<str>,
+    pub(crate) text: Box<str>,
+}
+
+/// A value in a message of a stream.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct ShownValue {
+    pub(crate) time: Stamp,
+    pub(crate) stream: usize,
+    /// The index of the field in the message.
+    pub(crate) field: usize,
+    pub(crate) value: Box<str>,
+}
+
+/// The kept log texts and message values.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct LoggedTexts {
+    said: Vec<LoggedText>,
+    shown: Vec<ShownValue>,
+    /// The number of bytes of log texts and of values.
+    bytes: [usize; 2],
+}
+
+/// The most bytes of log texts, and of values, that are kept.
+const MOST_TEXTS: usize = 2 << 20;
+/// The overhead of a short text in bytes.
+const TEXT_ENTRY: usize = 48;
+
+impl LoggedTexts {
+    /// Adds a log text.
+    pub(crate) fn add(&mut self, time: Stamp, logger: &str, text: &str) {
+        self.bytes[0] += text.len() + TEXT_ENTRY;
+        if self.bytes[0] <= MOST_TEXTS {
+            self.said.push(LoggedText {
+                time,
+                logger: logger.into(),
+                text: text.into(),
+            });
+        }
+    }
+
+    /// Adds a value in a message.
+    pub(crate) fn show(&mut self, time: Stamp, (stream, field): (usize, usize), value: &str) {
+        self.bytes[1] += value.len() + TEXT_ENTRY;
+        if self.bytes[1] <= MOST_TEXTS {
+            self.shown.push(ShownValue {
+                time,
+                stream,
+                field,
+                value: value.into(),
+            });
+        }
+    }
+
+    /// Drops those at other times than these.
+    pub(crate) fn clip(&mut self, span: Span) {
+        self.said.retain(|text| span.contains(text.time));
+        self.shown.retain(|value| span.contains(value.time));
+    }
+
+    /// Log texts and values, sorted; of values that a field repeats, only the first.
+    pub(crate) fn sorted(&self) -> (Vec<LoggedText>, Vec<ShownValue>) {
+        let (mut said, mut shown) = (self.said.clone(), self.shown.clone());
+        said.sort_unstable();
+        shown.sort_unstable();
+        let mut last: BTreeMap<(usize, usize), Box<str>> = BTreeMap::new();
+        shown.retain(|message| {
+            let place = (message.stream, message.field);
+            let before = last.insert(place, message.value.clone());
+            before.is_none_or(|value| value != message.value)
+        });
+        (said, shown)
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::*;
+    mod observations {
+        use super::super::*;
 
-    fn alive(node: Name) -> Statement {
-        Statement::new(Observation::Node(node), Confidence::Stated)
-    }
+        fn alive(node: Name) -> Statement {
+            Statement::new(Observation::Node(node), Confidence::Stated)
+        }
 
-    #[test]
-    fn names_beyond_the_budget_are_counted_and_left_out() {
-        let mut observations = Observations::default();
-        let long = "x".repeat(budget::NAME + 1);
-        for k in 0..budget::NAMES + 10 {
-            let node = observations.name(&format!("/n{k}"));
+        #[test]
+        fn names_beyond_the_budget_are_counted_and_left_out() {
+            let mut observations = Observations::default();
+            let long = "x".repeat(budget::NAME + 1);
+            for k in 0..budget::NAMES + 10 {
+                let node = observations.name(&format!("/n{k}"));
+                observations.add(0, alive(node), None);
+            }
+            let node = observations.name(&long);
             observations.add(0, alive(node), None);
+            assert_eq!(
+                (observations.list.len(), observations.dropped),
+                (budget::NAMES, 11)
+            );
+            observations.renumber();
+            let node = observations.name("/one more");
+            observations.add(0, alive(node), None);
+            assert_eq!(observations.dropped, 12);
         }
-        let node = observations.name(&long);
-        observations.add(0, alive(node), None);
-        assert_eq!(
-            (observations.list.len(), observations.dropped),
-            (budget::NAMES, 11)
-        );
-        observations.renumber();
-        let node = observations.name("/one more");
-        observations.add(0, alive(node), None);
-        assert_eq!(observations.dropped, 12);
+
+        #[test]
+        fn long_names_do_not_exhaust_memory() {
+            let mut observations = Observations::default();
+            for k in 0..1000 {
+                observations.name(&format!("{k:060000}"));
+            }
+            assert!(observations.bytes <= budget::NAMES_BYTES);
+            assert!(
+                (500..600).contains(&observations.texts.len()),
+                "{}",
+                observations.texts.len()
+            );
+        }
     }
 
-    #[test]
-    fn long_names_do_not_exhaust_memory() {
-        let mut observations = Observations::default();
-        for k in 0..1000 {
-            observations.name(&format!("{k:060000}"));
+    mod texts {
+        use super::super::*;
+
+        #[test]
+        fn repeated_field_values_are_kept_once() {
+            let mut texts = LoggedTexts::default();
+            for (time, value) in [(3, "b"), (1, "a"), (2, "a"), (4, "a")] {
+                texts.show(Stamp(time), (0, 0), value);
+            }
+            let times: Vec<_> = texts.sorted().1.iter().map(|s| s.time.0).collect();
+            assert_eq!(times, [1, 3, 4]);
         }
-        assert!(observations.bytes <= budget::NAMES_BYTES);
-        assert!(
-            (500..600).contains(&observations.texts.len()),
-            "{}",
-            observations.texts.len()
-        );
+
+        #[test]
+        fn either_side_is_bounded() {
+            let mut texts = LoggedTexts::default();
+            let long = "x".repeat(1 << 20);
+            (0..9).for_each(|n| texts.add(Stamp(n), "/a", &long));
+            texts.show(Stamp(0), (0, 0), "kept");
+            let (said, shown) = texts.sorted();
+            assert_eq!((said.len(), shown.len()), (1, 1));
+        }
     }
 }

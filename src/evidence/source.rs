@@ -1,53 +1,38 @@
-//! The interface of a kind of evidence: the messages that it reads, and the collection of its observations. One file per
-//! kind.
+//! The interface of a kind of evidence. In: messages of known layouts, announcements of connections, and all conclusions so
+//! far. Out: observations, and inferences from them. One file per subject; begin with `rosout`, the log of every node.
 
 pub(crate) mod action;
-pub(crate) mod anonymous;
-pub(crate) mod bond;
 pub(crate) mod connection;
 pub(crate) mod contract;
+pub(crate) mod conventions;
 pub(crate) mod diagnostics;
 pub(crate) mod discovery;
-pub(crate) mod duplicate;
-pub(crate) mod dynamic_reconfigure;
 pub(crate) mod echo;
 pub(crate) mod equal_stamps;
 pub(crate) mod lifecycle;
-pub(crate) mod links;
 pub(crate) mod log_text;
-pub(crate) mod messages_lost;
-pub(crate) mod metrics;
-pub(crate) mod only_publisher;
-pub(crate) mod parameter_events;
+pub(crate) mod parameters;
 pub(crate) mod payload;
-pub(crate) mod private_name;
 pub(crate) mod qos;
-pub(crate) mod qos_overrides;
 pub(crate) mod recorder;
 pub(crate) mod rosgraph;
 pub(crate) mod rosout;
-pub(crate) mod rosout_ros2;
-pub(crate) mod rosout_rule;
-pub(crate) mod selected;
 pub(crate) mod service_event;
-pub(crate) mod sim_time;
 pub(crate) mod sister;
 pub(crate) mod statistics;
-pub(crate) mod tf_pair;
-pub(crate) mod topic_statistics;
 
 use crate::base::name::{in_space, plain_type};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::SOURCES;
 use crate::evidence::inference::{Conclusions, Stream};
 use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
-use crate::evidence::message::definition::{LayoutFit, MessageLayout};
 use crate::evidence::message::dynamic::MessageSchema;
+use crate::evidence::message::dynamic::{LayoutFit, MessageLayout};
 use crate::evidence::message::log::{LogRecord, is_ros1_log};
-use crate::evidence::message::parameters::ParameterEvent;
 use crate::evidence::observation::{
     Confidence, Measurement, Name, Observation, Observations, SourceId, Statement,
 };
+use crate::evidence::source::parameters::ParameterEvent;
 
 /// A kind of evidence.
 pub struct Source {

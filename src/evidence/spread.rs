@@ -1,14 +1,15 @@
 //! The variation of the lag between messages: of two streams on one path, that of the one closer to the output varies less.
 
 /// The lags seen so far.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Default)]
 pub(crate) struct Spread {
     count: f64,
     sum: f64,
     squares: f64,
 }
 
-/// The number of standard errors by which two variances must differ to count as different.
+/// The number of standard errors by which two variances must differ to count as different: chance does it once in a thousand
+/// times.
 const CLEAR: f64 = 3.0;
 
 impl Spread {

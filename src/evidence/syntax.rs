@@ -5,7 +5,7 @@ pub(crate) use tree_sitter::Node;
 use std::ops::ControlFlow;
 
 /// The language of a source file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 pub(crate) enum Language {
     Python,
     Cpp,

@@ -2,18 +2,17 @@
 //!
 //! Times arrive in any order and are returned sorted, so that the order of messages in a file never matters.
 
-mod block;
-mod merge;
-
-use std::collections::BTreeMap;
+use std::cmp::Reverse;
+use std::collections::binary_heap::PeekMut;
+use std::collections::{BTreeMap, BinaryHeap};
 use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use tempfile::SpooledTempFile;
 
+use crate::base::ids::{ById, ids};
 use crate::base::time::{Span, Stamp};
-
-pub(crate) use merge::Timed;
+use crate::base::varint::{put, take_u64};
 
 /// The number of stamps per block: enough for a block's head (32 bytes) to be negligible, few enough to sort
 /// in the cache.
@@ -53,9 +52,11 @@ impl Calendar {
     }
 }
 
-/// The number of a sequence of times, counted from 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) struct SeriesId(pub u32);
+ids! {
+    @pub(crate),
+    /// The number of a sequence of times, counted from 0.
+    SeriesId,
+}
 
 /// An encoded run of stamps and its position.
 #[derive(Clone, Debug)]
@@ -92,28 +93,52 @@ impl OpenSeries {
 }
 
 /// Any number of sequences of times, each message with its size if known.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Stamps {
-    series: Vec<OpenSeries>,
-    /// The temporary file; locked because reading moves its position.
-    spool: Mutex<SpooledTempFile>,
-    written: u64,
+    series: ById<SeriesId, OpenSeries>,
+    spool: Spool,
     open: usize,
     /// The messages of each bag by day.
-    calendars: BTreeMap<usize, Calendar>,
+    calendars: ById<usize, Calendar>,
     failed: Option<io::Error>,
 }
 
-impl Default for Stamps {
+/// The temporary file of encoded blocks, and the number of bytes written to it.
+#[derive(Debug)]
+struct Spool {
+    /// Locked because reading moves its position.
+    file: Mutex<SpooledTempFile>,
+    written: u64,
+}
+
+impl Default for Spool {
     fn default() -> Self {
         Self {
-            series: Vec::new(),
-            spool: Mutex::new(SpooledTempFile::new(IN_MEMORY)),
+            file: Mutex::new(SpooledTempFile::new(IN_MEMORY)),
             written: 0,
-            open: 0,
-            calendars: BTreeMap::new(),
-            failed: None,
         }
+    }
+}
+
+impl Spool {
+    /// Adds bytes; returns their position.
+    fn append(&mut self, bytes: &[u8]) -> io::Result<u64> {
+        let at = self.written;
+        let file = self.file.get_mut();
+        let file = file.unwrap_or_else(PoisonError::into_inner);
+        file.seek(SeekFrom::Start(at))?;
+        file.write_all(bytes)?;
+        self.written += bytes.len() as u64;
+        Ok(at)
+    }
+
+    /// The bytes of a block.
+    fn bytes(&self, block: &StampBlock) -> io::Result<Vec<u8>> {
+        let mut bytes = vec![0; block.bytes as usize];
+        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        file.seek(SeekFrom::Start(block.at))?;
+        file.read_exact(&mut bytes)?;
+        Ok(bytes)
     }
 }
 
@@ -128,14 +153,13 @@ impl Stamps {
         self.series.push(OpenSeries {
             bag,
             ..OpenSeries::default()
-        });
-        SeriesId(u32::try_from(self.series.len() - 1).unwrap_or(u32::MAX))
+        })
     }
 
     /// Adds times; `sizes`, if given, is as long as `stamps`. Times for a sequence that does not exist are
     /// dropped.
     pub(crate) fn add(&mut self, id: SeriesId, stamps: &[Stamp], sizes: Option<&[u32]>) {
-        let Some(series) = self.series.get_mut(id.0 as usize) else {
+        let Some(series) = self.series.get_mut(id) else {
             return;
         };
         let sizes = sizes.filter(|s| s.len() == stamps.len());
@@ -145,9 +169,7 @@ impl Stamps {
             series.open.push((*stamp, size));
             if series.open.len() == BLOCK {
                 self.open = self.open.saturating_sub(BLOCK - 1);
-                let spool = self.spool.get_mut();
-                let spool = spool.unwrap_or_else(PoisonError::into_inner);
-                close(series, spool, &mut self.written, &mut self.calendars)
+                close(series, &mut self.spool, &mut self.calendars)
                     .unwrap_or_else(|e| self.failed = Some(e));
             } else {
                 self.open += 1;
@@ -161,10 +183,8 @@ impl Stamps {
 
     /// Encodes all open stamps as blocks.
     fn close_all(&mut self) {
-        let spool = self.spool.get_mut();
-        let spool = spool.unwrap_or_else(PoisonError::into_inner);
-        for series in &mut self.series {
-            close(series, spool, &mut self.written, &mut self.calendars)
+        for series in self.series.iter_mut() {
+            close(series, &mut self.spool, &mut self.calendars)
                 .unwrap_or_else(|e| self.failed = Some(e));
         }
         self.open = 0;
@@ -193,17 +213,12 @@ impl Stamps {
             series.count = series.open.len() as u64;
             new.open += series.open.len();
             for block in old.blocks.iter().filter(|block| block.last >= from) {
-                let bytes = self.bytes(block)?;
-                let spool = new.spool.get_mut();
-                let spool = spool.unwrap_or_else(PoisonError::into_inner);
-                spool.seek(SeekFrom::Start(new.written))?;
-                spool.write_all(&bytes)?;
+                let at = new.spool.append(&self.spool.bytes(block)?)?;
                 series.hold(StampBlock {
-                    at: new.written,
+                    at,
                     ..block.clone()
                 });
                 series.count += u64::from(block.count);
-                new.written += bytes.len() as u64;
             }
             new.series.push(series);
         }
@@ -227,7 +242,7 @@ impl Stamps {
     /// If times could not be written to the unnamed file.
     pub(crate) fn finish(&mut self) -> io::Result<()> {
         self.close_all();
-        for series in &mut self.series {
+        for series in self.series.iter_mut() {
             series.open = Vec::new();
             series.blocks.sort_by_key(|b| (b.first, b.last, b.at));
         }
@@ -268,7 +283,7 @@ impl Stamps {
     }
 
     /// The messages of each bag by day, as they were added and as far as they are in blocks.
-    pub(crate) fn calendars(&self) -> &BTreeMap<usize, Calendar> {
+    pub(crate) fn calendars(&self) -> &ById<usize, Calendar> {
         &self.calendars
     }
 
@@ -319,7 +334,7 @@ impl Stamps {
 
     /// Replaces the times of a sequence by these, sorted, which its calendar contains already.
     fn fill(&mut self, id: SeriesId, times: &[(Stamp, u32)], sized: bool) -> io::Result<()> {
-        let Some(series) = self.series.get_mut(id.0 as usize) else {
+        let Some(series) = self.series.get_mut(id) else {
             return Ok(());
         };
         *series = OpenSeries {
@@ -328,44 +343,29 @@ impl Stamps {
             size_unknown: !sized,
             ..OpenSeries::default()
         };
-        let spool = self.spool.get_mut();
-        let spool = spool.unwrap_or_else(PoisonError::into_inner);
         for block in times.chunks(BLOCK) {
             series.open = block.to_vec();
-            close(series, spool, &mut self.written, &mut BTreeMap::new())?;
+            close(series, &mut self.spool, &mut ById::default())?;
         }
         series.open = Vec::new();
         Ok(())
     }
 
     fn get(&self, id: SeriesId) -> Option<&OpenSeries> {
-        self.series.get(id.0 as usize)
-    }
-
-    fn spool(&self) -> MutexGuard<'_, SpooledTempFile> {
-        self.spool.lock().unwrap_or_else(PoisonError::into_inner)
+        self.series.get(id)
     }
 
     fn load(&self, block: &StampBlock) -> io::Result<Vec<(Stamp, u32)>> {
-        let bytes = self.bytes(block)?;
-        Ok(block::decode(&bytes, block.count as usize))
-    }
-
-    fn bytes(&self, block: &StampBlock) -> io::Result<Vec<u8>> {
-        let mut bytes = vec![0; block.bytes as usize];
-        let mut spool = self.spool();
-        spool.seek(SeekFrom::Start(block.at))?;
-        spool.read_exact(&mut bytes)?;
-        Ok(bytes)
+        let bytes = self.spool.bytes(block)?;
+        Ok(decode(&bytes, block.count as usize))
     }
 }
 
 /// Sorts and writes the open stamps of a series.
 fn close(
     series: &mut OpenSeries,
-    spool: &mut SpooledTempFile,
-    written: &mut u64,
-    calendars: &mut BTreeMap<usize, Calendar>,
+    spool: &mut Spool,
+    calendars: &mut ById<usize, Calendar>,
 ) -> io::Result<()> {
     let mut open = std::mem::take(&mut series.open);
     if !open.is_sorted() {
@@ -375,21 +375,161 @@ fn close(
         return Ok(());
     };
     let (first, last) = (first.0, last.0);
-    calendars.entry(series.bag).or_default().add(&open);
-    let bytes = block::encode(&open);
+    calendars.grown(series.bag).add(&open);
+    let bytes = encode(&open);
     series.hold(StampBlock {
         first,
         last,
-        at: *written,
+        at: spool.append(&bytes)?,
         bytes: u32::try_from(bytes.len()).unwrap_or(u32::MAX),
         count: u32::try_from(open.len()).unwrap_or(u32::MAX),
     });
-    spool.seek(SeekFrom::Start(*written))?;
-    spool.write_all(&bytes)?;
-    *written += bytes.len() as u64;
     open.clear();
     series.open = open;
     Ok(())
+}
+
+// A sorted run of stamps as bytes: differences as variable-length numbers, then the sizes.
+
+/// Writes sorted stamps with their sizes.
+fn encode(run: &[(Stamp, u32)]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(run.len() * 6);
+    let mut before = 0_i64;
+    for (stamp, _) in run {
+        // Wraps around on purpose: any two stamps differ by less than 2^64.
+        put(&mut bytes, stamp.0.wrapping_sub(before).cast_unsigned());
+        before = stamp.0;
+    }
+    if run.iter().any(|(_, size)| *size != 0) {
+        for (_, size) in run {
+            put(&mut bytes, u64::from(*size));
+        }
+    }
+    bytes
+}
+
+/// Reads `count` stamps back; sizes are 0 if none were written.
+fn decode(mut bytes: &[u8], count: usize) -> Vec<(Stamp, u32)> {
+    let mut before = 0_i64;
+    let mut run = Vec::with_capacity(count);
+    for _ in 0..count {
+        before = before.wrapping_add(take_u64(&mut bytes).cast_signed());
+        run.push((Stamp(before), 0));
+    }
+    if !bytes.is_empty() {
+        for (_, size) in &mut run {
+            *size = u32::try_from(take_u64(&mut bytes)).unwrap_or(u32::MAX);
+        }
+    }
+    run
+}
+
+// Several sequences of sorted blocks as one sorted sequence.
+
+/// One time from one of several sequences.
+#[derive(Clone, Copy)]
+pub(crate) struct Timed {
+    /// The time.
+    pub time: Stamp,
+    /// The index of the sequence among the requested ones.
+    pub series: usize,
+    /// The payload's bytes; 0 if unknown ([`Stamps::sized`]).
+    pub size: u32,
+}
+
+/// The next stamp of a block being read, in the order in which they are passed on. Small, since each step
+/// moves several.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+struct Next {
+    time: Stamp,
+    series: usize,
+    size: u32,
+    /// The index of its block among those being read.
+    block: u32,
+}
+
+/// The blocks being read, and the free slots of those that were read completely.
+#[derive(Default)]
+struct OpenBlocks {
+    runs: Vec<std::vec::IntoIter<(Stamp, u32)>>,
+    free: Vec<u32>,
+    heap: BinaryHeap<Reverse<Next>>,
+}
+
+impl Stamps {
+    /// Passes all times of some sequences to `each`, sorted by (time, index of the sequence, size).
+    ///
+    /// # Errors
+    /// If the unnamed file cannot be read.
+    pub(crate) fn merge(&self, ids: &[SeriesId], mut each: impl FnMut(Timed)) -> io::Result<()> {
+        let mut waiting = self.blocks(ids);
+        let mut open = OpenBlocks::default();
+        loop {
+            let top = open.heap.peek().map(|next| next.0.time);
+            let next = waiting.last().map(|(_, block)| block.first);
+            match (top, next) {
+                (None, None) => return Ok(()),
+                (top, Some(next)) if top.is_none_or(|top| next <= top) => {
+                    if let Some((series, block)) = waiting.pop() {
+                        open.enter(series, self.load(&block)?);
+                    }
+                }
+                _ => open.drain(next, &mut each),
+            }
+        }
+    }
+
+    /// The blocks of these sequences with the indices of the sequences, the earliest last.
+    fn blocks(&self, ids: &[SeriesId]) -> Vec<(usize, StampBlock)> {
+        let of = |id: &SeriesId| self.get(*id).map_or(&[][..], |s| &s.blocks);
+        let mut all: Vec<_> = ids
+            .iter()
+            .enumerate()
+            .flat_map(|(place, id)| of(id).iter().map(move |b| (place, b.clone())))
+            .collect();
+        all.sort_by_key(|(place, b)| Reverse((b.first, *place, b.at)));
+        all
+    }
+}
+
+impl OpenBlocks {
+    /// Begins to read a block.
+    fn enter(&mut self, series: usize, run: Vec<(Stamp, u32)>) {
+        let mut run = run.into_iter();
+        let Some((time, size)) = run.next() else {
+            return;
+        };
+        let block = self.free.pop().unwrap_or_else(|| {
+            self.runs.push(Vec::new().into_iter());
+            u32::try_from(self.runs.len() - 1).unwrap_or(u32::MAX)
+        });
+        self.runs[block as usize] = run;
+        self.heap.push(Reverse(Next {
+            time,
+            series,
+            size,
+            block,
+        }));
+    }
+
+    /// Passes on stamps until a waiting block begins before them.
+    fn drain(&mut self, waiting: Option<Stamp>, each: &mut impl FnMut(Timed)) {
+        while let Some(mut top) = self.heap.peek_mut() {
+            let next = &mut top.0;
+            if waiting.is_some_and(|waiting| waiting <= next.time) {
+                return;
+            }
+            let (time, series, size) = (next.time, next.series, next.size);
+            each(Timed { time, series, size });
+            let block = next.block;
+            if let Some((time, size)) = self.runs[block as usize].next() {
+                (next.time, next.size) = (time, size);
+            } else {
+                self.free.push(block);
+                PeekMut::pop(top);
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -444,7 +584,7 @@ mod tests {
         assert_eq!(all.times(rest).unwrap(), stamps([3, 5, DAY]));
         assert!(all.sized(id) && all.sized(rest));
         assert_eq!((all.count(id), all.count(rest)), (1, 3));
-        assert_eq!(all.calendars()[&0].days.values().sum::<u64>(), 4);
+        assert_eq!(all.calendars()[0].days.values().sum::<u64>(), 4);
     }
 
     #[test]
@@ -453,7 +593,7 @@ mod tests {
         let id = all.series_of(7);
         all.add(id, &stamps([5, 0, 3, 0]), Some(&[50, 10, 30, 7]));
         all.finish().unwrap();
-        let calendar = &all.calendars()[&7];
+        let calendar = &all.calendars()[7];
         assert_eq!((calendar.zeros, calendar.next), (2, Some(Stamp(3))));
         let span = Span::new(Stamp(1), Stamp(5));
         assert_eq!((all.clip(id, span).unwrap(), all.count(id)), (3, 1));
@@ -491,7 +631,8 @@ mod tests {
             all.add(*id, &[Stamp(n << 42)], None);
         }
         all.finish().unwrap();
-        assert!(all.spool().is_rolled() || all.written <= IN_MEMORY as u64);
+        let is_rolled = all.spool.file.get_mut().unwrap().is_rolled();
+        assert!(is_rolled || all.spool.written <= IN_MEMORY as u64);
         let mut next = 0;
         all.merge(&ids, |t| {
             assert_eq!(t.time, Stamp(next << 42));

@@ -69,13 +69,8 @@ fn owned(known: &mut Conclusions<'_>, owners: &Owners, topic: Name) {
     let node = known.facts.name(&format!("{owner} ?"));
     let why =
         format!("the publisher of {text} is not named; only {owner} is known to publish {kind}");
-    add(
-        known,
-        "owned_type",
-        node,
-        ElementKey::Publish(node, topic),
-        &|| why.clone(),
-    );
+    let edge = ElementKey::Publish(node, topic);
+    add(known, "owned_type", node, edge, &|| why.clone());
     for (publishes, other) in owners.others(known, &kind, &owner) {
         let (verb, edge) = if publishes {
             ("publishes", ElementKey::Publish(node, other))

@@ -1,9 +1,10 @@
 //! Stated values of elements: lifecycle states, types and quality of service.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::io;
 use std::sync::Arc;
 
+use crate::base::ids::ById;
 use crate::base::name::SERVICE;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::observation::{Name, Observation, Observations};
@@ -35,9 +36,9 @@ fn arrange(states: &mut [(Stamp, Arc<str>)]) {
 #[derive(Debug, Default)]
 pub(crate) struct StatedValues {
     /// The states of each node with the times of its transitions, sorted.
-    states: BTreeMap<Name, Vec<(Stamp, Arc<str>)>>,
-    types: BTreeMap<Name, BTreeSet<Arc<str>>>,
-    qualities: BTreeMap<Name, BTreeSet<Arc<str>>>,
+    states: ById<Name, Vec<(Stamp, Arc<str>)>>,
+    types: ById<Name, BTreeSet<Arc<str>>>,
+    qualities: ById<Name, BTreeSet<Arc<str>>>,
 }
 
 impl StatedValues {
@@ -48,22 +49,19 @@ impl StatedValues {
                 Observation::Lifecycle(node, state) => {
                     let state = facts.text(state);
                     let times = facts.times(fact)?.into_iter();
-                    let states = all.states.entry(node).or_default();
+                    let states = all.states.grown(node);
                     states.extend(times.map(|time| (time, Arc::clone(&state))));
                 }
                 Observation::Type(topic, kind) => {
-                    all.types.entry(topic).or_default().insert(facts.text(kind));
+                    all.types.grown(topic).insert(facts.text(kind));
                 }
                 Observation::Quality(topic, words) => {
-                    all.qualities
-                        .entry(topic)
-                        .or_default()
-                        .insert(facts.text(words));
+                    all.qualities.grown(topic).insert(facts.text(words));
                 }
                 _ => {}
             }
         }
-        for states in all.states.values_mut() {
+        for states in all.states.iter_mut() {
             states.sort();
             arrange(states);
         }
@@ -72,7 +70,7 @@ impl StatedValues {
 
     /// Adds a type that the user states. The type of services is ignored if the actual type is known.
     pub(crate) fn state_type(&mut self, topic: Name, kind: &str) {
-        let kinds = self.types.entry(topic).or_default();
+        let kinds = self.types.grown(topic);
         if kind != SERVICE || kinds.is_empty() {
             kinds.remove(SERVICE);
             kinds.insert(kind.into());
@@ -81,7 +79,7 @@ impl StatedValues {
 
     /// The state of a node at the end of a window; `None` before its first transition.
     pub(crate) fn lifecycle(&self, node: Name, window: Span) -> Option<Arc<str>> {
-        let states = self.states.get(&node)?;
+        let states = self.states.of(node);
         let next = states.partition_point(|(time, _)| *time < window.end);
         states
             .get(next.checked_sub(1)?)
@@ -90,18 +88,18 @@ impl StatedValues {
 
     /// The transitions of a node with their times, in order.
     pub(crate) fn transitions(&self, node: Name) -> impl Iterator<Item = &(Stamp, Arc<str>)> {
-        self.states.get(&node).into_iter().flatten()
+        self.states.of(node).iter()
     }
 
     /// The stated types of a topic.
     pub(crate) fn types(&self, topic: Name) -> impl Iterator<Item = Arc<str>> + '_ {
-        self.types.get(&topic).into_iter().flatten().cloned()
+        self.types.get(topic).into_iter().flatten().cloned()
     }
 
     /// The quality of service of a topic.
     pub(crate) fn quality(&self, topic: Name) -> Option<Arc<str>> {
-        let all: Vec<&str> = self.qualities.get(&topic)?.iter().map(|q| &**q).collect();
-        Some(all.join(", ").into())
+        let all: Vec<&str> = self.qualities.get(topic)?.iter().map(|q| &**q).collect();
+        (!all.is_empty()).then(|| all.join(", ").into())
     }
 }
 

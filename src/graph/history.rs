@@ -1,8 +1,17 @@
 //! A mission in continuous time: the lifetimes of each element with their uncertainty, and the messages of
 //! every sender as stretches of one rate.
 //!
-//! Made once, from observations and stamps; windows, events, phases and figures are derived from it. Nothing
-//! here depends on windows.
+//! In: everything recorded, and the findings. Out: a [`History`], made once, from which windows, events, phases and figures
+//! are derived; nothing here depends on windows. Begin with `records`, which calls the others in order: `senders` reads the
+//! times of every topic, `recordings` and `restarts` find pauses and restarts in them, `tracks` collects the signs of each
+//! element, `lifetimes` decides when it existed.
+
+mod lifetimes;
+mod recordings;
+pub(crate) mod records;
+mod restarts;
+pub(crate) mod senders;
+mod tracks;
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -11,6 +20,10 @@ use std::sync::Arc;
 use super::{ById, Element, Elements, Graphs, NodeId, State, TopicId};
 use crate::base::rhythm::{FEWEST, LONGER, OFTEN, SAME_RATE, STEADY, STEADY_NS, broken_after};
 use crate::base::time::{Span, Stamp};
+
+pub(crate) use records::{History, Record, made};
+pub(crate) use restarts::unread;
+pub(crate) use senders::traffic;
 
 /// A moment with its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -217,7 +230,6 @@ pub(crate) fn begins_steadily(stretches: &[Stretch]) -> bool {
 }
 
 /// A transition of a node to a lifecycle state.
-#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Transition {
     pub(crate) node: NodeId,
     pub(crate) time: Stamp,
@@ -302,7 +314,7 @@ pub(crate) fn all_silent(
 const PAUSES: usize = 32;
 
 /// The longest pauses of one sequence of messages, collected message by message.
-#[derive(Clone, Debug, Default)]
+#[derive(Default)]
 pub(crate) struct LongestPauses {
     last: Option<Stamp>,
     /// The longest so far, by length; the shortest is replaced first.

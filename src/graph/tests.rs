@@ -8,7 +8,7 @@ use crate::base::time::{Span, Stamp};
 use crate::evidence::Confidence;
 use crate::evidence::collector::Collector;
 use crate::evidence::conclude::ConcludeOptions;
-use crate::evidence::topology::NamedElement::{Node, Subscribe};
+use crate::evidence::given::NamedElement::{Node, Subscribe};
 
 const SECOND: i64 = 1_000_000_000;
 
@@ -268,7 +268,7 @@ fn a_latched_message_sent_again_after_a_silence_is_a_restart() {
 
 #[test]
 fn user_topology_is_added_without_overwriting() {
-    let entry = |element, from_ns, to_ns| crate::evidence::topology::TopologyEntry {
+    let entry = |element, from_ns, to_ns| crate::evidence::given::TopologyEntry {
         element,
         from_ns,
         to_ns,
@@ -276,7 +276,7 @@ fn user_topology_is_added_without_overwriting() {
         place: String::new(),
     };
     let options = ConcludeOptions {
-        topology: crate::evidence::topology::Topology {
+        topology: crate::evidence::given::Topology {
             entries: vec![
                 entry(Node("/x".to_owned()), None, None),
                 entry(

@@ -6,30 +6,20 @@ use crate::base::time::{Moment, Period, Span, Stamp};
 use crate::base::words::{self, worded};
 
 const SECOND: i64 = 1_000_000_000;
-/// The periods for a bag shorter than five minutes, in nanoseconds, the longest first.
-const SHORT: [i64; 9] = [
-    30 * SECOND,
-    20 * SECOND,
-    10 * SECOND,
-    5 * SECOND,
-    2 * SECOND,
-    SECOND,
-    SECOND / 2,
-    SECOND / 5,
-    SECOND / 10,
-];
-/// The periods for a bag longer than 600 minutes, in nanoseconds, the shortest first.
-const LONG: [i64; 9] = [
-    120 * SECOND,
-    300 * SECOND,
-    600 * SECOND,
-    1800 * SECOND,
-    3600 * SECOND,
-    7200 * SECOND,
-    21_600 * SECOND,
-    43_200 * SECOND,
-    86_400 * SECOND,
-];
+/// The periods for a bag shorter than five minutes, in milliseconds, the longest first.
+const SHORT: [i64; 9] = [30_000, 20_000, 10_000, 5000, 2000, 1000, 500, 200, 100];
+/// The periods for a bag longer than 600 minutes, in seconds, the shortest first.
+const LONG: [i64; 9] = [120, 300, 600, 1800, 3600, 7200, 21_600, 43_200, 86_400];
+
+/// The periods for short bags in nanoseconds, the longest first.
+fn short() -> [i64; 9] {
+    SHORT.map(|millis| millis * (SECOND / 1000))
+}
+
+/// The periods for long bags in nanoseconds, the shortest first.
+fn long() -> [i64; 9] {
+    LONG.map(|seconds| seconds * SECOND)
+}
 
 /// The requested length of a window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -133,14 +123,13 @@ pub fn range(division: &Division, bag: Span) -> Result<Span> {
 pub fn default_period(nanos: i64) -> Period {
     let minute = 60 * SECOND;
     let chosen = if nanos < 5 * minute {
-        SHORT
-            .into_iter()
-            .find(|p| count(nanos, *p) >= 5)
-            .unwrap_or(SHORT[8])
+        let short = short();
+        let enough = short.into_iter().find(|p| count(nanos, *p) >= 5);
+        enough.unwrap_or(short[8])
     } else if count(nanos, minute) > budget::CHOSEN_WINDOWS {
-        LONG.into_iter()
-            .find(|p| count(nanos, *p) <= budget::CHOSEN_WINDOWS)
-            .unwrap_or_else(|| whole_days(nanos))
+        let fits = |p: &i64| count(nanos, *p) <= budget::CHOSEN_WINDOWS;
+        let found = long().into_iter().find(fits);
+        found.unwrap_or_else(|| whole_days(nanos))
     } else {
         minute
     };
@@ -149,7 +138,7 @@ pub fn default_period(nanos: i64) -> Period {
 
 /// The fewest whole days that cover `nanos` with at most [`budget::CHOSEN_WINDOWS`] windows.
 fn whole_days(nanos: i64) -> i64 {
-    let day = LONG[8];
+    let day = long()[8];
     count(count(nanos, day), budget::CHOSEN_WINDOWS) * day
 }
 
@@ -235,7 +224,7 @@ fn first_start(division: &Division, span: Span, period: Period, step: Period) ->
 }
 
 fn too_many(many: i64, nanos: i64) -> Error {
-    let ladder = SHORT.into_iter().rev().chain([60 * SECOND]).chain(LONG);
+    let ladder = short().into_iter().rev().chain([60 * SECOND]).chain(long());
     let enough = ladder
         .into_iter()
         .find(|p| count(nanos, *p) <= budget::WINDOWS);

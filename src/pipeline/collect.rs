@@ -8,9 +8,8 @@ use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::Span;
 use crate::base::words;
-use crate::evidence::clock;
+use crate::evidence::clock::{self, ClockOffset};
 use crate::evidence::collector::{self, Collector, Recorded};
-use crate::evidence::offsets::ClockOffset;
 use crate::graph::window;
 
 /// The bags of a mission, read.

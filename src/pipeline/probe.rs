@@ -43,7 +43,7 @@ pub(super) fn probe(
             let span = Span::new(wanted[0].0, wanted[wanted.len() - 1].0.plus(1));
             reader.read(Some(span), &mut sink)?;
             for (at, time, number) in sink.found {
-                let numbers = collected.recorded.numbers.entry(at).or_default();
+                let numbers = collected.recorded.numbers.grown(at).get_or_insert_default();
                 numbers.keep(time, number);
             }
         }

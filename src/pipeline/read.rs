@@ -321,7 +321,7 @@ fn mission(
 /// Sorts bags by their first messages, then by name: the order in which they were given does not matter.
 fn in_order(bags: &mut Vec<Report>, recorded: &Recorded) {
     let firsts = recorded.firsts();
-    let first = |bag| firsts.get(&bag).copied().unwrap_or(Stamp::MAX);
+    let first = |bag| firsts.some(bag).copied().unwrap_or(Stamp::MAX);
     let mut all: Vec<_> = (0..).map(first).zip(bags.drain(..)).collect();
     all.sort_by(|(a, x), (b, y)| (a, &x.name).cmp(&(b, &y.name)));
     bags.extend(all.into_iter().map(|(_, bag)| bag));

@@ -1,5 +1,6 @@
-//! Declarations in source code: publishers, subscribers, nodes and their names, each with its location.
+//! Declarations in source code: publishers, subscribers, nodes and their names, each with its location; and the values of names.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 
 use crate::base::words::{self, worded};
@@ -27,7 +28,7 @@ impl Role {
 }
 
 /// The kind of object that a call creates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Made {
     Publisher,
     Subscriber,
@@ -65,7 +66,7 @@ pub(crate) struct Declaration {
 }
 
 /// The code of a class, or of a file outside its classes (its name is empty). In C++ a class may be spread over files.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Class {
     pub(crate) name: String,
     /// The names of its base classes, without namespaces.
@@ -86,7 +87,6 @@ pub(crate) struct Class {
 }
 
 /// The classes of a file, the first one for what is outside of all, and those around the visited element.
-#[derive(Debug)]
 pub(super) struct Classes {
     pub(super) all: Vec<Class>,
     /// The ends of the enclosing classes, with their indices.
@@ -122,7 +122,7 @@ impl Classes {
 }
 
 /// The content of a source file.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Default)]
 pub(crate) struct FileCode {
     /// The code outside classes first.
     pub(crate) classes: Vec<Class>,
@@ -131,7 +131,6 @@ pub(crate) struct FileCode {
 }
 
 /// A call that creates an object: its topic and types as far as known.
-#[derive(Clone, Debug)]
 pub(super) struct Call {
     pub(super) made: Made,
     pub(super) topic: Option<String>,
@@ -255,4 +254,65 @@ pub(crate) fn type_key(type_name: &str) -> String {
 pub(super) fn short(text: &str) -> String {
     let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
     words::shorten(&words, 100).into_owned()
+}
+
+// The values of names and parameters, where each has only one.
+
+/// The longest text that is assembled, in bytes: longer than any topic.
+pub(super) const LONGEST: usize = 1000;
+
+/// The most steps from name to name that are followed.
+pub(super) const DEEPEST: usize = 8;
+
+/// Names with the expressions assigned to them; a name with several has no known value.
+pub(super) struct TextValues<'a> {
+    /// The number of expressions that may still be evaluated for their texts.
+    work: Cell<usize>,
+    names: BTreeMap<String, Option<Node<'a>>>,
+    parameters: BTreeMap<String, Option<Node<'a>>>,
+}
+
+impl<'a> TextValues<'a> {
+    /// The values of a file of this many bytes. As many expressions may be evaluated: hand-written code needs a tenth, and
+    /// names that refer to each other repeatedly cost no more than reading the file.
+    pub(super) fn new(bytes: usize) -> Self {
+        Self {
+            work: Cell::new(1000 + bytes),
+            names: BTreeMap::new(),
+            parameters: BTreeMap::new(),
+        }
+    }
+
+    /// Counts an expression at this depth; `None` if it is too deep or there were too many.
+    pub(super) fn evaluate(&self, depth: usize) -> Option<()> {
+        self.work.set(self.work.get().checked_sub(1)?);
+        (depth <= DEEPEST).then_some(())
+    }
+
+    /// Records an assignment to a name.
+    pub(super) fn set(&mut self, name: &str, value: Node<'a>) {
+        put(&mut self.names, name, value);
+    }
+
+    /// Records a parameter's default.
+    pub(super) fn set_parameter(&mut self, name: &str, value: Node<'a>) {
+        put(&mut self.parameters, name, value);
+    }
+
+    pub(super) fn get(&self, name: &str) -> Option<Node<'a>> {
+        *self.names.get(name)?
+    }
+
+    pub(super) fn parameter(&self, name: &str) -> Option<Node<'a>> {
+        *self.parameters.get(name)?
+    }
+}
+
+fn put<'a>(map: &mut BTreeMap<String, Option<Node<'a>>>, name: &str, value: Node<'a>) {
+    match map.get_mut(name) {
+        Some(known) => *known = None,
+        None => {
+            map.insert(name.to_owned(), Some(value));
+        }
+    }
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::base::error::{Error, Result};
 
 /// A file of the workspace.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug)]
 pub(super) struct SourceFile {
     /// The path below the workspace, with slashes.
     pub(super) path: String,
@@ -39,7 +39,7 @@ pub(super) const MOST_FILES: usize = 50_000;
 /// The most text that is read, in bytes: ten times the largest workspace seen.
 pub(super) const MOST_BYTES: usize = 200 << 20;
 
-/// The deepest nesting of folders that is entered.
+/// The deepest nesting of folders that is entered, as folders may be mounted in circles.
 const DEEPEST: usize = 40;
 
 /// Folders with built, fetched or hidden files.

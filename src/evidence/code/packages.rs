@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::files::{FileKind, SourceFile, kind};
+use crate::evidence::given::substitution::closing;
 
 /// A package, by its `package.xml`.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Default)]
 pub(super) struct Package {
     pub(super) name: String,
     /// The folder below the workspace, with a slash at the end; empty at the top.
@@ -210,7 +211,7 @@ fn commands(text: &str) -> Vec<(&str, Vec<&str>)> {
             rest = after.split_once('\n').map_or("", |(_, next)| next);
             continue;
         }
-        let end = closing(after);
+        let end = closing(after).unwrap_or(after.len());
         let inside = &after[..end];
         let words = inside
             .lines()
@@ -222,20 +223,6 @@ fn commands(text: &str) -> Vec<(&str, Vec<&str>)> {
         rest = after.get(end + 1..).unwrap_or_default();
     }
     found
-}
-
-/// The position of the parenthesis that closes the one at the start.
-fn closing(text: &str) -> usize {
-    let mut open = 1_usize;
-    let end = text.char_indices().find(|(_, c)| {
-        match c {
-            '(' => open += 1,
-            ')' => open -= 1,
-            _ => {}
-        }
-        open == 0
-    });
-    end.map_or(text.len(), |(at, _)| at)
 }
 
 #[cfg(test)]

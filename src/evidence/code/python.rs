@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::declaration::{Call, Class, Classes, Declaration, FileCode, Made, short, type_of};
-use super::texts::{DEEPEST, LONGEST, TextValues};
+use super::declaration::{
+    Call, Class, Classes, DEEPEST, Declaration, FileCode, LONGEST, Made, TextValues, short, type_of,
+};
 use crate::evidence::syntax::{Language, Node, Parsed, arguments, children, line, walk};
 
 /// Reads a file; empty if it is too deeply nested.
@@ -43,7 +44,7 @@ struct PythonReader<'a> {
     bound: BTreeMap<&'a str, Node<'a>>,
 }
 
-/// The most iterations of the loops around a call that are followed.
+/// The most iterations of the loops around a call that are followed: nested loops multiply them.
 const MOST_TURNS: usize = 64;
 
 impl<'a> PythonReader<'a> {

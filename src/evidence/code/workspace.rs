@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use super::declaration::{Class, Declaration, FileCode};
 use super::packages::{Package, Program, package_of};
-use crate::evidence::topology::launch::LaunchedNode;
+use crate::evidence::given::launch::LaunchedNode;
 
 /// The content of a workspace.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(super) struct Workspace {
     pub(super) packages: Vec<Package>,
     pub(super) files: Vec<CodeFile>,
@@ -20,7 +20,6 @@ pub(super) struct Workspace {
 }
 
 /// A source file.
-#[derive(Debug)]
 pub(super) struct CodeFile {
     pub(super) path: String,
     pub(super) package: Option<usize>,
@@ -59,7 +58,6 @@ pub(crate) struct Instance {
 }
 
 /// A node in the code.
-#[derive(Clone, Debug)]
 struct CodeNode {
     names: Vec<String>,
     program: (String, String),
@@ -70,17 +68,17 @@ struct CodeNode {
 /// Base classes that make a class a node.
 const NODES: &[&str] = &["LifecycleNode", "ManagedNode", "Node", "Nodelet"];
 
-/// The most parts of a node.
+/// The most parts of a node; more are of names that many classes share.
 const MOST_PARTS: usize = 300;
 
 /// The most declarations of one node, and of all nodes together: a hundred times those of the largest robots.
 const MOST_DECLARED: usize = 1000;
 const MOST_OF_ALL: usize = 500_000;
 
-/// The most classes that may share a name; a more common name counts only in its own file.
+/// The most classes that may share a name; a more common name, as `Node`, says nothing outside of its own file.
 const MOST_NAMESAKES: usize = 500;
 
-/// The most programs that launch files may start.
+/// The most programs that launch files may start; like the next limit, it bounds time and memory.
 const MOST_PROGRAMS: usize = 5_000;
 
 /// The most nodes that a workspace may start.

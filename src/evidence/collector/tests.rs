@@ -1,7 +1,9 @@
 //! Tests of every source with single messages.
 
+mod tests_ros2;
+
 use super::*;
-use crate::bag::{ConnectionId, Encoding, Sink as _};
+use crate::bag::Encoding;
 use crate::evidence::observation::{Confidence, Observation, Observations, Statement};
 
 /// A payload under construction.

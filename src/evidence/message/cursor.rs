@@ -49,7 +49,7 @@ pub(crate) struct PayloadCursor<'a> {
 }
 
 /// The content of a `std_msgs/Header`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 pub(crate) struct Header {
     /// The sequence number, which ROS 2 has left out.
     pub(crate) number: Option<u32>,

@@ -1,12 +1,12 @@
-//! A message as data, decoded by its own definition: for messages whose layout has changed over the years.
+//! A message as data, decoded by its own definition, for messages whose layout has changed over the years; and known layouts,
+//! recognised by type, and by definition or hash.
 
 use crate::bag::{Connection, Encoding};
 use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
-use crate::evidence::message::definition::outline;
-use crate::evidence::message::fields::Form;
+use crate::evidence::message::definition::{self, Form};
 
 /// A part of a message.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub(crate) enum MessageValue {
     Text(String),
     /// An unsigned number of one byte.
@@ -54,7 +54,7 @@ const BUILT_IN: [(&str, &str); 2] = [
 ];
 
 /// A parsed definition.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct MessageSchema(Vec<(String, String)>);
 
 impl MessageSchema {
@@ -217,26 +217,187 @@ fn whole(number: impl Into<i128>) -> PayloadResult<MessageValue> {
     Ok(MessageValue::Number(Some(number.into())))
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// A message layout.
+pub(crate) struct MessageLayout {
+    /// The type, without ROS 2's `/msg`: `rosgraph_msgs/Log`. A star at its start is a wildcard.
+    pub(crate) type_name: &'static str,
+    /// The type's md5 sum in ROS 1, used if the definition is missing; empty in ROS 2.
+    pub(crate) md5: &'static str,
+    /// The fields of the message and of all messages inside it but [`STANDARD`], as [`outline`] writes them, with `time`
+    /// and `duration` as in ROS 1; empty if the reader looks at the definition itself.
+    pub(crate) fields: &'static [(&'static str, &'static str)],
+}
 
-    #[test]
-    fn a_message_is_decoded_by_its_definition() {
-        let schema = MessageSchema::of_text(
-            "Part[] parts\nuint8 last\n===\nMSG: a/Part\nuint16 n\nstring name\n",
-        );
-        let data = [0, 1, 0, 0, 1, 0, 0, 0, 7, 0, 0, 0, 2, 0, 0, 0, b'x', 0, 9];
-        let value = schema
-            .read(&mut PayloadCursor::cdr(&data).unwrap())
-            .unwrap();
-        assert_eq!(value.list("parts")[0].text("name"), "x");
-        assert_eq!(value.field("last"), Some(&MessageValue::Byte(9)));
+/// The confidence to which a connection fits a layout.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LayoutFit {
+    /// The connection has another type or encoding.
+    OtherType,
+    /// The connection has the type, but not its fields.
+    OtherFields,
+    /// The connection has the layout, as far as known.
+    Same,
+}
+
+/// Messages that cursors read in all their forms, so that a layout is the same in recordings converted from one version of
+/// ROS to the other.
+const STANDARD: [(&str, &str); 4] = [
+    ("Header", "uint32 seq;time stamp;string frame_id"),
+    ("Header", "time stamp;string frame_id"),
+    ("Time", "int32 sec;uint32 nanosec"),
+    ("Duration", "int32 sec;uint32 nanosec"),
+];
+
+/// `rosgraph_msgs/Log`.
+pub(crate) const LOG: MessageLayout = MessageLayout {
+    type_name: "rosgraph_msgs/Log",
+    md5: "acffd30cd6b6de30f120938c17c593fb",
+    fields: &[(
+        "",
+        "Header header;byte level;string name;string msg;string file;string function;uint32 line;string[] topics",
+    )],
+};
+
+/// `rosgraph_msgs/Log` before 2011.
+pub(crate) const OLD_LOG: MessageLayout = MessageLayout {
+    type_name: "roslib/Log",
+    ..LOG
+};
+
+/// `rcl_interfaces/msg/Log`.
+pub(crate) const LOG2: MessageLayout = MessageLayout::ros2(
+    "rcl_interfaces/Log",
+    &[(
+        "",
+        "time stamp;byte level;string name;string msg;string file;string function;uint32 line",
+    )],
+);
+
+/// Log records of ROS 1.
+pub(crate) const ROS1_LOGS: &[MessageLayout] = &[LOG, OLD_LOG];
+
+/// All log records.
+pub(crate) const LOGS: &[MessageLayout] = &[LOG, OLD_LOG, LOG2];
+
+impl MessageLayout {
+    /// The layout of a type of ROS 2, which has no checksum.
+    pub(crate) const fn ros2(
+        type_name: &'static str,
+        fields: &'static [(&'static str, &'static str)],
+    ) -> Self {
+        Self {
+            type_name,
+            md5: "",
+            fields,
+        }
     }
 
-    #[test]
-    fn a_recursive_definition_is_refused() {
-        let schema = MessageSchema::of_text("A a\n===\nMSG: x/A\nA a\n");
-        assert!(schema.read(&mut PayloadCursor::ros1(&[0; 64])).is_err());
+    /// Whether the messages of a connection, whose type is this one without `/msg`, can be read, in either encoding;
+    /// `outline` is that of its definition.
+    pub(crate) fn fit(
+        &self,
+        connection: &Connection,
+        type_name: &str,
+        outline: &[(String, String)],
+    ) -> LayoutFit {
+        let named = match self.type_name.strip_prefix('*') {
+            Some(end) => type_name.ends_with(end),
+            None => type_name == self.type_name,
+        };
+        if !named || matches!(connection.encoding, Encoding::Other(_)) {
+            return LayoutFit::OtherType;
+        }
+        if self.fields.is_empty() {
+            return LayoutFit::Same;
+        }
+        let definition = connection.definition.as_deref().unwrap_or_default();
+        let hash = connection.type_hash.as_deref().unwrap_or_default();
+        let same = if definition.trim().is_empty() {
+            // There is nothing to compare; a payload that is not consumed exactly is still refused.
+            let has_md5 = connection.encoding == Encoding::Ros1 && !self.md5.is_empty();
+            !has_md5 || ["", "*", self.md5].contains(&hash)
+        } else {
+            self.matches(outline)
+        };
+        if same {
+            LayoutFit::Same
+        } else {
+            LayoutFit::OtherFields
+        }
+    }
+
+    /// The message itself must have the fields; nested messages are compared if the definition contains them.
+    fn matches(&self, outline: &[(String, String)]) -> bool {
+        outline.iter().enumerate().all(|(at, (name, fields))| {
+            let name = if at == 0 { "" } else { name.as_str() };
+            let fields = fields.replace("Time ", "time ");
+            let fields = fields.replace("Duration ", "duration ");
+            let all = self.fields.iter().chain(&STANDARD);
+            let mut known = all.filter(|(known, _)| *known == name).peekable();
+            let is_nested = at != 0;
+            is_nested && known.peek().is_none() || known.any(|(_, known)| *known == fields)
+        })
+    }
+}
+
+/// The messages in the definition of a type, the outermost first: the last part of the name, then `type name` of each field,
+/// separated by `;`. Comments, constants, defaults, bounds and packages are left out; all types of one byte are `byte`.
+pub(crate) fn outline(definition: &str, type_name: &str, form: Form) -> Vec<(String, String)> {
+    let messages = definition::messages(definition, type_name, form).unwrap_or_default();
+    let fields = |message: &definition::MessageFields| {
+        let fields = message.fields.iter().map(|field| {
+            let kind = match field.kind.rsplit('/').next().unwrap_or_default() {
+                "int8" | "uint8" | "char" | "bool" => "byte",
+                other => other,
+            };
+            format!("{kind}{} {}", field.array, field.name)
+        });
+        fields.collect::<Vec<_>>().join(";")
+    };
+    messages
+        .iter()
+        .map(|message| (message.name.clone(), fields(message)))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    mod values {
+        use super::super::*;
+
+        #[test]
+        fn a_message_is_decoded_by_its_definition() {
+            let schema = MessageSchema::of_text(
+                "Part[] parts\nuint8 last\n===\nMSG: a/Part\nuint16 n\nstring name\n",
+            );
+            let data = [0, 1, 0, 0, 1, 0, 0, 0, 7, 0, 0, 0, 2, 0, 0, 0, b'x', 0, 9];
+            let value = schema
+                .read(&mut PayloadCursor::cdr(&data).unwrap())
+                .unwrap();
+            assert_eq!(value.list("parts")[0].text("name"), "x");
+            assert_eq!(value.field("last"), Some(&MessageValue::Byte(9)));
+        }
+
+        #[test]
+        fn a_recursive_definition_is_refused() {
+            let schema = MessageSchema::of_text("A a\n===\nMSG: x/A\nA a\n");
+            assert!(schema.read(&mut PayloadCursor::ros1(&[0; 64])).is_err());
+        }
+    }
+
+    mod layouts {
+        use super::super::*;
+
+        #[test]
+        fn a_definition_is_boiled_down_to_its_fields() {
+            let text = "# a comment\nbyte OK=0 # fine\nstd_msgs/Header header\nuint8 level # how bad\nstring<=255 id\n\
+                    KeyValue[<=3] values\nint32 n 5\n===\nMSG: some_msgs/KeyValue\nstring key\nstring X = a;b\n";
+            let fields = |at: usize| outline(text, "a/B", Form::Msg)[at].clone();
+            assert_eq!(
+                fields(0).1,
+                "Header header;byte level;string id;KeyValue[] values;int32 n"
+            );
+            assert_eq!(fields(1), ("KeyValue".to_owned(), "string key".to_owned()));
+        }
     }
 }

@@ -5,22 +5,16 @@
 //! <https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html>). Arrays of bytes are bytes. A time is one
 //! column; a duration is two, `sec` and `nanosec`, in ROS 1 as in ROS 2.
 
-mod definition;
-mod idl;
-mod known;
-mod text;
-
 use std::ops::Range;
+use std::path::Path;
+use std::sync::{Arc, LazyLock};
 
-use super::cursor::{Malformed, PayloadCursor, other_cdr};
 use crate::bag::{Connection, Encoding};
 use crate::base::table::{Batch, ColumnKind, ColumnValues, TableColumn};
-use definition::Definition;
-use known::Carried;
-use text::{Array, Field};
-
-pub(crate) use known::KnownTypes;
-pub(crate) use text::{Form, MessageFields, messages};
+use crate::evidence::message::cursor::{Malformed, PayloadCursor, other_cdr};
+use crate::evidence::message::definition::{
+    Array, Field, Form, MessageFields, messages, without_comment,
+};
 
 /// The deepest nesting of messages; deeper ones are hostile.
 const DEEPEST: usize = 16;
@@ -57,7 +51,7 @@ enum DecodeStep {
 }
 
 /// A parsed definition, ready to decode messages.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub(crate) struct Decoder {
     encoding: Encoding,
     steps: Vec<DecodeStep>,
@@ -460,6 +454,195 @@ fn numbers(
         _ => {}
     }
     Ok(())
+}
+
+// The messages that make up a type, from its definition in the bag and from known types.
+
+/// The package of `Header`.
+const HEADERS: &str = "std_msgs";
+
+/// The messages of a type, the outermost first.
+#[derive(Clone)]
+struct Definition {
+    messages: Vec<Arc<MessageFields>>,
+    /// The number of messages from the bag's text, which come first: in some old bags it names nested ones without their
+    /// packages.
+    loose: usize,
+}
+
+impl Definition {
+    /// The definition in the bag.
+    ///
+    /// # Errors
+    /// The reason why it cannot be used.
+    fn parse(connection: &Connection) -> Result<Self, String> {
+        if is_blank(connection) {
+            return Err(
+                "the bag contains no definition of its type; `--msg-path` adds it".to_owned(),
+            );
+        }
+        let text = connection.definition.as_deref().unwrap_or_default();
+        let mut messages = messages(text, &connection.type_name, Form::of(connection))?;
+        for reason in messages.iter_mut().filter_map(|one| one.wrong.as_mut()) {
+            reason.push_str("; `--msg-path` replaces it");
+        }
+        Ok(Self {
+            loose: messages.len(),
+            messages: messages.into_iter().map(Arc::new).collect(),
+        })
+    }
+
+    /// The definition of a message without fields, if that is what the bag may mean by an empty one.
+    fn empty(connection: &Connection) -> Option<Self> {
+        let is_defined = connection.definition.is_some();
+        (is_defined && is_blank(connection)).then(|| Self {
+            messages: vec![Arc::new(MessageFields::new(&connection.type_name))],
+            loose: 0,
+        })
+    }
+
+    /// The definition of a type that is among `known` ones.
+    fn known(known: &[Arc<MessageFields>], type_name: &str) -> Option<Self> {
+        let name = MessageFields::new(type_name);
+        let own = known.iter().find(|m| m.is_called(&name))?;
+        Some(Self {
+            messages: std::iter::once(own).chain(known).cloned().collect(),
+            loose: 0,
+        })
+    }
+
+    /// This definition with `known` types for what it lacks.
+    fn completed(&self, known: &[Arc<MessageFields>]) -> Self {
+        Self {
+            messages: [&self.messages, known].concat(),
+            loose: self.loose,
+        }
+    }
+
+    /// This definition with `known` types in place of its nested ones.
+    fn corrected(&self, known: &[Arc<MessageFields>]) -> Self {
+        let (own, nested) = self.messages.split_at(1);
+        Self {
+            messages: [own, known, nested].concat(),
+            loose: 0,
+        }
+    }
+
+    /// The index of the message that `kind` refers to in the message with index `from`: in the named package, in the
+    /// same package, in any.
+    ///
+    /// # Errors
+    /// If the definition does not contain it.
+    fn find(&self, from: usize, kind: &str, is_cdr: bool) -> Result<usize, String> {
+        let mut wanted = MessageFields::new(kind);
+        let is_header = kind == "Header";
+        if wanted.package.is_empty() {
+            // `Header` alone refers to that of `std_msgs`, in ROS 1 always.
+            wanted.package = if is_header && !is_cdr {
+                HEADERS.to_owned()
+            } else {
+                self.messages[from].package.clone()
+            };
+        }
+        let found = self.first(|_, m| m.is_called(&wanted));
+        let found = found.or_else(|| {
+            let in_package = |m: &MessageFields| is_header && m.package == HEADERS;
+            self.first(|at, m| m.name == wanted.name && (in_package(m) || at < self.loose))
+        });
+        found.ok_or_else(|| format!("its definition lacks the type `{kind}`; `--msg-path` adds it"))
+    }
+
+    /// The index of the first nested message that fits, if possible of one that can be used.
+    fn first(&self, fits: impl Fn(usize, &MessageFields) -> bool) -> Option<usize> {
+        let nested = || self.messages.iter().enumerate().skip(1);
+        let mut fitting = nested().filter(|(at, m)| fits(*at, m));
+        let usable = fitting.clone().find(|(_, m)| m.wrong.is_none());
+        Some(usable.or_else(|| fitting.next())?.0)
+    }
+}
+
+/// Whether a connection has no definition, or an empty one.
+fn is_blank(connection: &Connection) -> bool {
+    let text = connection.definition.as_deref().unwrap_or_default();
+    let mut lines = text.lines().map(without_comment);
+    lines.all(str::is_empty)
+}
+
+// Types that bags may use without definition: those of common packages, and those in the user's files.
+// rosbag2's sqlite3 recordings contain no definitions before ROS 2 Iron.
+
+/// The suffix of a type's name for its fields before they changed.
+const BEFORE: &str = " before";
+
+/// The version of the built-in types.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Carried {
+    Ros1,
+    Ros2,
+    /// ROS 2 before some of them changed.
+    OlderRos2,
+}
+
+/// Types by package and name, the user's own first.
+#[derive(Default)]
+pub(crate) struct KnownTypes {
+    own: Vec<Arc<MessageFields>>,
+}
+
+/// The fields of common packages' types, each with whether it is an earlier version. The texts are generated
+/// by `carry.py` in the same folder; their headers list the sources.
+static ROS1: LazyLock<CarriedTypes> = LazyLock::new(|| carried(include_str!("fields/ros1.msg")));
+static ROS2: LazyLock<CarriedTypes> = LazyLock::new(|| carried(include_str!("fields/ros2.msg")));
+
+type CarriedTypes = Vec<(Arc<MessageFields>, bool)>;
+
+fn carried(text: &str) -> CarriedTypes {
+    let all = messages(text, "", Form::Msg).unwrap_or_default();
+    let named = all.into_iter().skip(1).map(|mut message| {
+        let name = message.name.strip_suffix(BEFORE).map(str::to_owned);
+        let is_older = name.is_some();
+        message.name = name.unwrap_or(message.name);
+        (Arc::new(message), is_older)
+    });
+    named.collect()
+}
+
+impl KnownTypes {
+    /// Adds the types of the file of `name`, `my_msgs/Thing`, by its text, or the reason why there is none. One that cannot
+    /// be used is an error of the messages that need it; `path` names it.
+    pub(crate) fn add(&mut self, name: &str, path: &Path, text: Result<String, String>) {
+        let end = path.extension().unwrap_or_default().to_string_lossy();
+        let form = Form::named(&end.to_uppercase()).unwrap_or(Form::Msg);
+        let all = text.and_then(|text| messages(&text, name, form));
+        // The file of a service or an action defines no message of its own name.
+        let all = all.map(|all| {
+            all.into_iter()
+                .skip(usize::from(form.has_parts()))
+                .collect()
+        });
+        let mut all: Vec<_> =
+            all.unwrap_or_else(|reason| vec![MessageFields::malformed(name, reason)]);
+        for reason in all.iter_mut().filter_map(|message| message.wrong.as_mut()) {
+            *reason = format!("`{}`: {reason}", path.display());
+        }
+        self.own.extend(all.into_iter().map(Arc::new));
+    }
+
+    /// All types. The first match is used.
+    fn all(&self, carried: Carried) -> Vec<Arc<MessageFields>> {
+        let built_in = match carried {
+            Carried::Ros1 => &ROS1,
+            Carried::Ros2 | Carried::OlderRos2 => &ROS2,
+        };
+        let mut all = self.own.clone();
+        for is_older in [true, false] {
+            if !is_older || carried == Carried::OlderRos2 {
+                let version = built_in.iter().filter(|t| t.1 == is_older);
+                all.extend(version.map(|t| Arc::clone(&t.0)));
+            }
+        }
+        all
+    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use crate::base::name::plain_type;
 use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
 
 /// A log record.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Default)]
 pub(crate) struct LogRecord<'a> {
     /// The name of the node or logger in the record.
     pub(crate) name: &'a str,

@@ -4,9 +4,9 @@
 use super::SourceContext;
 use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::message::definition::MessageLayout;
+use crate::evidence::message::dynamic::MessageLayout;
 use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// `actionlib_msgs/GoalStatusArray`.
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
@@ -51,11 +51,8 @@ pub(crate) fn read(
             let node = context.name(client);
             let goal = context.name(&format!("{action}/goal"));
             let words = || format!("goal `{id}` on {action}");
-            context.observation(
-                Observation::Publish(node, goal),
-                Confidence::Inferred,
-                words,
-            );
+            let stated = Observation::Publish(node, goal);
+            context.observation(stated, Confidence::Inferred, words);
         }
     }
     Ok(())
@@ -69,95 +66,73 @@ fn client(id: &str) -> Option<&str> {
     (node.starts_with('/') && digits(number) && digits(time)).then_some(node)
 }
 
-/// The suffixes of the topics that a server publishes; a client publishes the others.
-const SENDS: [&str; 3] = ["status", "feedback", "result"];
-const TAKES: [&str; 2] = ["goal", "cancel"];
+/// The parts of an action, each with a topic: a server publishes the first [`SENT`] and subscribes to the others; a client
+/// does the reverse. For example, a publisher of `/dock/goal` is a client, so it also publishes `/dock/cancel` and subscribes
+/// to `/dock/status`, `/dock/feedback` and `/dock/result`.
+const PARTS: [&str; 5] = ["status", "feedback", "result", "goal", "cancel"];
+const SENT: usize = 3;
 
-/// The parts of an action that a bag contains or a source names, by the action's name.
-type Actions = BTreeMap<String, BTreeMap<&'static str, Name>>;
+/// The topics of an action by part, as far as the bag contains them or a source names them.
+type Parts = [Option<Name>; 5];
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
-    for (action, parts) in ros1_actions(known) {
-        let mut all = BTreeMap::new();
-        for part in SENDS.iter().chain(&TAKES) {
-            all.insert(*part, known.facts.name(&format!("{action}/{part}")));
-        }
+    for action in ros1_actions(known) {
+        let topics = PARTS.map(|part| format!("{action}/{part}"));
+        let parts = topics.each_ref().map(|topic| known.facts.known(topic));
+        let all = topics.map(|topic| Some(known.facts.name(&topic)));
         tie(source, known, &parts, &all);
     }
-    for (_, parts) in ros2_actions(known) {
+    for parts in ros2_actions(known).into_values() {
         tie(source, known, &parts, &parts);
     }
 }
 
 /// Adds all edges that follow from the known ones.
-fn tie(
-    source: SourceId,
-    known: &mut Conclusions<'_>,
-    parts: &BTreeMap<&'static str, Name>,
-    all: &BTreeMap<&'static str, Name>,
-) {
-    for (own, other) in [(&SENDS[..], &TAKES[..]), (&TAKES[..], &SENDS[..])] {
+fn tie(source: SourceId, known: &mut Conclusions<'_>, parts: &Parts, all: &Parts) {
+    for is_server in [true, false] {
+        let (own, other): (Vec<usize>, Vec<usize>) =
+            (0..PARTS.len()).partition(|part| (*part < SENT) == is_server);
         let mut basis: BTreeMap<Name, ElementKey> = BTreeMap::new();
-        for topic in own.iter().filter_map(|part| parts.get(part)) {
-            for node in known.publishers(*topic).collect::<Vec<_>>() {
-                basis
-                    .entry(node)
-                    .or_insert(ElementKey::Publish(node, *topic));
+        for topic in own.iter().filter_map(|part| parts[*part]) {
+            for node in known.publishers(topic) {
+                let what = ElementKey::Publish(node, topic);
+                basis.entry(node).or_insert(what);
             }
         }
         for (node, basis) in basis {
-            for topic in own.iter().filter_map(|part| all.get(part)) {
-                if ElementKey::Publish(node, *topic) != basis {
-                    known.like(source, ElementKey::Publish(node, *topic), basis);
+            for topic in own.iter().filter_map(|part| all[*part]) {
+                let what = ElementKey::Publish(node, topic);
+                if what != basis {
+                    known.like(source, what, basis);
                 }
             }
-            for topic in other.iter().filter_map(|part| all.get(part)) {
-                known.like(source, ElementKey::Subscribe(*topic, node), basis);
+            for topic in other.iter().filter_map(|part| all[*part]) {
+                known.like(source, ElementKey::Subscribe(topic, node), basis);
             }
         }
     }
 }
 
 /// Actions of ROS 1: a status topic, or a goal topic of a goal's type.
-fn ros1_actions(known: &mut Conclusions<'_>) -> Actions {
-    let status = known.topics_of(|kind| kind == "actionlib_msgs/GoalStatusArray");
+fn ros1_actions(known: &Conclusions<'_>) -> BTreeSet<String> {
+    let status = known.topics_of(|kind| kind == SHAPE.type_name);
     let goals = known.topics_of(|kind| kind.ends_with("ActionGoal"));
-    let mut actions = Actions::new();
-    for (topic, part) in status
-        .iter()
-        .map(|t| (t, "/status"))
-        .chain(goals.iter().map(|t| (t, "/goal")))
-    {
-        if let Some(action) = known.text(*topic).strip_suffix(part) {
-            actions.insert(action.to_owned(), BTreeMap::new());
-        }
-    }
-    for (action, parts) in &mut actions {
-        for part in SENDS.iter().chain(&TAKES) {
-            parts.extend(
-                known
-                    .facts
-                    .known(&format!("{action}/{part}"))
-                    .map(|t| (*part, t)),
-            );
-        }
-    }
-    actions
+    let status = status.iter().map(|topic| (topic, "/status"));
+    let topics = status.chain(goals.iter().map(|topic| (topic, "/goal")));
+    let actions =
+        topics.filter_map(|(topic, end)| Some(known.text(*topic).strip_suffix(end)?.to_owned()));
+    actions.collect()
 }
 
 /// Actions of ROS 2: a status or feedback topic below `_action`.
-fn ros2_actions(known: &mut Conclusions<'_>) -> Actions {
-    let mut actions = Actions::new();
-    for topic in
-        known.topics_of(|kind| kind.contains("/action/") || kind == "action_msgs/GoalStatusArray")
-    {
+fn ros2_actions(known: &Conclusions<'_>) -> BTreeMap<String, Parts> {
+    let is_part = |kind: &str| kind.contains("/action/") || kind == "action_msgs/GoalStatusArray";
+    let mut actions: BTreeMap<String, Parts> = BTreeMap::new();
+    for topic in known.topics_of(is_part) {
         if let Some((action, part)) = known.text(topic).rsplit_once("/_action/")
-            && let Some(part) = SENDS.iter().find(|p| **p == part)
+            && let Some(part) = PARTS[..SENT].iter().position(|own| *own == part)
         {
-            actions
-                .entry(action.to_owned())
-                .or_default()
-                .insert(part, topic);
+            actions.entry(action.to_owned()).or_default()[part] = Some(topic);
         }
     }
     actions

@@ -9,10 +9,8 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let streams = known.streams;
     for (at, stream) in streams.iter().enumerate() {
         let inference = |what, when| Inference::new(source, what, Confidence::Measured, when);
-        known.add(inference(
-            ElementKey::Topic(stream.topic),
-            Validity::Messages(at),
-        ));
+        let topic = ElementKey::Topic(stream.topic);
+        known.add(inference(topic, Validity::Messages(at)));
         let Some(node) = stream.publisher else {
             continue;
         };

@@ -6,13 +6,13 @@
 //! files is another program. A row without a node's name applies to every node that logs from one of its
 //! files.
 
-use std::collections::{BTreeMap, BTreeSet};
-
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::SourceContext;
 use crate::base::csv;
-use crate::base::name::{last_part, namespace};
+use crate::base::ids::ById;
+use crate::base::name::{last_part, resolved};
 use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Name, Observation, SourceId};
@@ -44,7 +44,7 @@ pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
 }
 
 /// A row of the table.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone)]
 struct Contract {
     /// The node's own name, without a namespace; empty for any.
     node: String,
@@ -106,11 +106,12 @@ fn contract(line: usize, row: &[String]) -> Option<Contract> {
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let files = files(known);
     let nodes = known.nodes().clone();
-    let mut publishers: BTreeMap<Name, Vec<(Name, Contract)>> = BTreeMap::new();
+    let mut publishers: ById<Name, Vec<(Name, Contract)>> = ById::default();
     for contract in Owners::new(known).0 {
         for node in nodes.iter().copied() {
             let name = known.text(node);
-            if !is_meant(&contract, &name, files.get(&node)) {
+            let own = files.get(node).filter(|own| !own.is_empty());
+            if !is_meant(&contract, &name, own) {
                 continue;
             }
             let topic = known.facts.known(&resolved(&contract.topic, &name));
@@ -118,10 +119,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
                 continue;
             };
             if contract.publishes {
-                publishers
-                    .entry(topic)
-                    .or_default()
-                    .push((node, contract.clone()));
+                publishers.grown(topic).push((node, contract.clone()));
             } else if !known.knows(ElementKey::Publish(node, topic)) {
                 let what = ElementKey::Subscribe(topic, node);
                 known.infer(source, what, ElementKey::Node(node), |known| {
@@ -130,8 +128,8 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             }
         }
     }
-    for (topic, nodes) in publishers {
-        publish(source, known, topic, &nodes);
+    for (topic, nodes) in publishers.with_ids() {
+        publish(source, known, topic, nodes);
     }
 }
 
@@ -218,13 +216,13 @@ impl Owners {
 }
 
 /// The files that each node logs from.
-fn files(known: &Conclusions<'_>) -> BTreeMap<Name, BTreeSet<Arc<str>>> {
-    let mut files: BTreeMap<Name, BTreeSet<Arc<str>>> = BTreeMap::new();
+fn files(known: &Conclusions<'_>) -> ById<Name, BTreeSet<Arc<str>>> {
+    let mut files: ById<Name, BTreeSet<Arc<str>>> = ById::default();
     for fact in &known.facts.list {
         if let Observation::LogsFrom(logger, file) = fact.observation
             && let Some(node) = known.owner(&known.text(logger))
         {
-            files.entry(node).or_default().insert(known.text(file));
+            files.grown(node).insert(known.text(file));
         }
     }
     files
@@ -238,21 +236,6 @@ fn is_meant(contract: &Contract, node: &str, files: Option<&BTreeSet<Arc<str>>>)
     } else {
         last_part(node) == contract.node && files.is_none_or(own)
     }
-}
-
-/// A topic's full name in the default configuration of a node.
-fn resolved(topic: &str, node: &str) -> String {
-    let space = namespace(node);
-    if let Some(private) = topic.strip_prefix("~/") {
-        return format!("{node}/{private}");
-    }
-    if let Some(outer) = topic.strip_prefix("../") {
-        return format!("{}/{outer}", namespace(space).trim_end_matches('/'));
-    }
-    if topic.starts_with('/') {
-        return topic.to_owned();
-    }
-    format!("{}/{topic}", space.trim_end_matches('/'))
 }
 
 #[cfg(test)]

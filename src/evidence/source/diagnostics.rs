@@ -4,7 +4,7 @@
 use super::SourceContext;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::message::definition::MessageLayout;
+use crate::evidence::message::dynamic::MessageLayout;
 use crate::evidence::observation::{Confidence, Observation, SourceId};
 use std::collections::BTreeSet;
 
@@ -46,11 +46,8 @@ pub(crate) fn read(
                 let node = context.name(&format!("/{node}"));
                 let topic = context.stream.topic;
                 let words = || format!("status `{name}`");
-                context.observation(
-                    Observation::Reports(node, topic),
-                    Confidence::Inferred,
-                    words,
-                );
+                let stated = Observation::Reports(node, topic);
+                context.observation(stated, Confidence::Inferred, words);
             }
         }
     }

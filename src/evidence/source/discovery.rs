@@ -3,7 +3,7 @@
 use super::SourceContext;
 use crate::base::digest::hex_of;
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::message::definition::MessageLayout;
+use crate::evidence::message::dynamic::MessageLayout;
 use crate::evidence::observation::Observation;
 
 /// `rmw_dds_common/msg/ParticipantEntitiesInfo`; its identifiers have 24 bytes up to Humble, 16 since.

@@ -6,6 +6,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::SourceContext;
+use crate::base::ids::ById;
 use crate::base::name::{in_space, plain_type};
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
@@ -13,27 +14,28 @@ use crate::evidence::message::cursor::PayloadCursor;
 use crate::evidence::message::dynamic::{MessageSchema, MessageValue};
 use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Confidence, Name, SourceId};
-use crate::evidence::texts::{LoggedText, ShownValue};
+use crate::evidence::observation::{LoggedText, ShownValue};
 
-/// The fewest different values that are significant; numbers are more often equal than words.
+/// The fewest different values that are significant: two may agree by chance, and numbers are more often equal than words.
 const FEWEST: usize = 3;
 const FEWEST_NUMBERS: usize = 5;
-/// The longest time between a text and the message that it repeats, in nanoseconds.
+/// The longest time between a text and the message that it repeats, in nanoseconds: both are recorded within milliseconds
+/// unless the recorder is busy. Counters run through the same numbers, so less is allowed between numbers.
 const NEAR_NS: i64 = 1_000_000_000;
 const NEAR_NUMBERS_NS: i64 = 200_000_000;
-/// The share, in per cent, of the texts of one form that must repeat a message.
+/// The share, in per cent, of the texts of one form that must repeat a message; the others' messages were not recorded.
 const SHARE: usize = 80;
 /// The shortest word that counts, in bytes; shorter ones are in too many texts.
 const SHORTEST: usize = 3;
 /// The longest payload that is searched, in bytes; longer ones contain no text that nodes log.
 const LONGEST: usize = 1024;
-/// The most values of one message that are kept.
+/// The most values of one message that are kept; like the limits below, it bounds the work.
 const MOST_VALUES: usize = 4;
-/// The most forms of texts that are examined closely.
+/// The most forms of texts that are examined closely: each is compared with all texts of its node.
 const MOST_FORMS: usize = 4096;
 /// The most forms of texts that are kept.
 const MOST_KEPT: usize = 1 << 14;
-/// The most messages that are compared with one text.
+/// The most messages that are compared with one text, so that the work grows with the texts alone.
 const MOST_NEAR: usize = 64;
 
 /// Keeps the text of a log record.
@@ -111,7 +113,7 @@ fn collect(value: &MessageValue, into: &mut Vec<String>) {
 }
 
 /// The texts of one form, by one node, about one topic.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct Echo {
     values: BTreeSet<Box<str>>,
     texts: BTreeSet<(Stamp, Box<str>)>,
@@ -125,10 +127,10 @@ type LogForm = (Name, String, String, Name);
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let (said, shown) = known.facts.logged.sorted();
     let echoes = echoes(known, &said, &shown);
-    let mut by_node: BTreeMap<Name, Vec<&str>> = BTreeMap::new();
+    let mut by_node: ById<Name, Vec<&str>> = ById::default();
     for text in &said {
         if let Some(node) = known.owner(&text.logger) {
-            by_node.entry(node).or_default().push(&text.text);
+            by_node.grown(node).push(&text.text);
         }
     }
     let enough = echoes
@@ -137,8 +139,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let strong: Vec<_> = enough
         .take(MOST_FORMS)
         .filter(|((node, before, after, _), echo)| {
-            let texts = by_node.get(node).map_or(&[][..], |texts| texts);
-            is_strong(echo, before, after, texts)
+            is_strong(echo, before, after, by_node.of(*node))
         })
         .collect();
     for ((node, before, after, topic), echo) in &strong {

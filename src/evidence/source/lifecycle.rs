@@ -2,7 +2,7 @@
 
 use super::SourceContext;
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::message::definition::MessageLayout;
+use crate::evidence::message::dynamic::MessageLayout;
 use crate::evidence::observation::Observation;
 
 /// `lifecycle_msgs/msg/TransitionEvent`.

@@ -1,10 +1,12 @@
-//! Log texts in which a node names a topic that it publishes or subscribes to: of rclcpp and rclpy about
-//! incompatible quality of service, of Gazebo's plugins, its bridge and rosserial about their endpoints.
+//! Log texts about topics and nodes: in which a node names a topic that it publishes or subscribes to (of rclcpp and rclpy about
+//! incompatible quality of service, of Gazebo's plugins, its bridge and rosserial about their endpoints), of two nodes of one name,
+//! and of roscpp about its connections.
 
-use super::SourceContext;
+use crate::base::name::resolved;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind, Inference, Validity};
 use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Confidence, Observation, SourceId};
+use crate::evidence::source::SourceContext;
 
 pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
     // Topics in the logs of a recorder or player belong to other nodes.
@@ -153,68 +155,267 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
-/// A topic's full name, from the form in a node's log text.
-fn resolved(topic: &str, node: &str) -> String {
-    let space = node.rsplit_once('/').map_or("", |(space, _)| space);
-    match topic.strip_prefix('~') {
-        Some(private) => format!("{node}/{}", private.trim_start_matches('/')),
-        None if topic.starts_with('/') => topic.to_owned(),
-        None => format!("{space}/{topic}"),
+// A topic's full name, from the form in a node's log text.
+// Two nodes of one name: rcl, where both log over one publisher, and the master of ROS 1, which ends the older one.
+
+pub(crate) fn read_duplicates(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
+    if let Some(node) = doubled(record) {
+        let node = context.name(&node);
+        context.states(Observation::Duplicate(node), || {
+            format!("{} logs: {}", record.logger, record.text)
+        });
     }
+}
+
+/// The duplicated node according to a text.
+fn doubled(record: &LogRecord<'_>) -> Option<String> {
+    let text = record.text;
+    if let Some((before, _)) = text.split_once("] Reason: new node registered with same name") {
+        return Some(before.rsplit_once('[')?.1.to_owned());
+    }
+    let rest = text.split_once("Publisher already registered for ")?.1;
+    // Since Iron the text names the logger; the record's own is `rcl.logging_rosout`, or the node's.
+    let named = rest
+        .strip_prefix("node name: '")
+        .and_then(|rest| rest.split_once('\''));
+    match named {
+        Some((name, _)) => Some(format!(
+            "/{}",
+            name.trim_start_matches('/').replace('.', "/")
+        )),
+        None => Some(record.logger.clone()).filter(|name| !name.starts_with("/rcl/")),
+    }
+}
+
+/// Adds the names that are used twice.
+pub(crate) fn conclude_duplicates(source: SourceId, known: &mut Conclusions<'_>) {
+    for fact in known.observed(source) {
+        let Observation::Duplicate(name) = fact.observation else {
+            continue;
+        };
+        let Some(node) = known.owner(&known.text(name)) else {
+            continue;
+        };
+        for time in known.times(&fact) {
+            let what = ElementKey::Node(node);
+            known.incident(source, what, IncidentKind::Duplicate, time);
+        }
+    }
+}
+
+// roscpp about its connections: start and end of subscribers (DEBUG), clients with another type, its own subscriptions;
+// and the recorder's `Subscribing to`, which gives the time at which a topic appeared.
+
+pub(crate) fn read_links(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
+    let (name, text, file) = (record.name, record.text, record.file);
+    if file.ends_with("recorder.cpp")
+        && let Some(topic) = text.strip_prefix("Subscribing to ")
+    {
+        let topic = context.name(topic.trim());
+        context.states(Observation::Appears(topic), || format!("{name}: {text}"));
+    }
+    let roscpp = file.rsplit('.').next() == Some("cpp");
+    if let Some(link) = link(text).filter(|_| roscpp) {
+        let node = context.name(link.node.unwrap_or(name));
+        let topic = context.name(link.topic);
+        let words = || format!("{name} logs: {text}");
+        let observation = match link.how {
+            How::Begins => Observation::Joins(node, topic),
+            How::Lasts => Observation::Subscribe(node, topic),
+            How::Refused => Observation::Refused(node, topic),
+            How::Ends => {
+                // It existed until now.
+                context.states(Observation::Node(node), words);
+                Observation::Unsubscribe(node, topic)
+            }
+        };
+        context.states(observation, words);
+    }
+}
+
+/// A subscription in a log text.
+#[derive(Debug, PartialEq, Eq)]
+struct LoggedSubscription<'a> {
+    /// The subscriber; `None` for the logging node.
+    node: Option<&'a str>,
+    topic: &'a str,
+    how: How,
+}
+
+/// The change of a subscription.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum How {
+    Begins,
+    Lasts,
+    Refused,
+    Ends,
+}
+
+/// The subscription in a log text of roscpp.
+fn link(text: &str) -> Option<LoggedSubscription<'_>> {
+    let between = |from: &str, to: &str| Some(text.split_once(from)?.1.split_once(to)?.0);
+    let caller = || between("callerid=[", "]");
+    let own = |topic| LoggedSubscription {
+        node: None,
+        topic,
+        how: How::Lasts,
+    };
+    let clients = |node, topic, how| LoggedSubscription {
+        node: Some(node),
+        topic,
+        how,
+    };
+    if text.starts_with("Connection: Creating TransportSubscriberLink for topic [") {
+        let topic = between("for topic [", "]")?;
+        return Some(clients(caller()?, topic, How::Begins));
+    }
+    if text.starts_with("Connection to subscriber [callerid=[") && text.contains("dropped") {
+        let topic = between("to topic [", "]")?;
+        return Some(clients(caller()?, topic, How::Ends));
+    }
+    if text.starts_with("Client [") && text.contains("to have datatype/md5sum") {
+        let topic = between("] wants topic ", " to have datatype")?;
+        return Some(clients(between("Client [", "]")?, topic, How::Refused));
+    }
+    if text.starts_with("Connection to publisher [") && text.contains("dropped") {
+        return Some(own(between("to topic [", "]")?));
+    }
+    if text.starts_with("Retrying connection to [") {
+        return Some(own(between("for topic [", "]")?));
+    }
+    None
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    mod topics {
+        use super::super::*;
 
-    #[test]
-    fn texts_name_their_topic_and_side() {
-        let texts = [
-            ("Advertise odometry on [/odom]", Some((true, "/odom"))),
-            ("Subscribed to [/cmd_vel]", Some((false, "/cmd_vel"))),
-            (
-                "New subscription discovered on topic '/scan', requesting incompatible QoS. No messages will be sent to it.",
-                Some((true, "/scan")),
-            ),
-            (
-                "Creating GZ->ROS Bridge: [/world/clock (gz.msgs.Clock) -> /clock (rosgraph_msgs/msg/Clock)] (Lazy 0)",
-                Some((true, "/clock")),
-            ),
-            (
-                "Creating ROS->GZ Bridge: [/cmd_vel (geometry_msgs/msg/Twist) -> /model/cmd (gz.msgs.Twist)] (Lazy 0)",
-                Some((false, "/cmd_vel")),
-            ),
-            (
-                "Setup publisher on chatter [std_msgs/String]",
-                Some((true, "chatter")),
-            ),
-            ("Publishing odom transforms between [odom] and [base]", None),
-            ("Subscribed to topic '/map'", None),
-            ("[Client 0] Subscribed to /odom", None),
-        ];
-        for (text, expected) in texts {
-            assert_eq!(named(text), expected, "{text}");
+        #[test]
+        fn texts_name_their_topic_and_side() {
+            let texts = [
+                ("Advertise odometry on [/odom]", Some((true, "/odom"))),
+                ("Subscribed to [/cmd_vel]", Some((false, "/cmd_vel"))),
+                (
+                    "New subscription discovered on topic '/scan', requesting incompatible QoS. No messages will be sent to it.",
+                    Some((true, "/scan")),
+                ),
+                (
+                    "Creating GZ->ROS Bridge: [/world/clock (gz.msgs.Clock) -> /clock (rosgraph_msgs/msg/Clock)] (Lazy 0)",
+                    Some((true, "/clock")),
+                ),
+                (
+                    "Creating ROS->GZ Bridge: [/cmd_vel (geometry_msgs/msg/Twist) -> /model/cmd (gz.msgs.Twist)] (Lazy 0)",
+                    Some((false, "/cmd_vel")),
+                ),
+                (
+                    "Setup publisher on chatter [std_msgs/String]",
+                    Some((true, "chatter")),
+                ),
+                ("Publishing odom transforms between [odom] and [base]", None),
+                ("Subscribed to topic '/map'", None),
+                ("[Client 0] Subscribed to /odom", None),
+            ];
+            for (text, expected) in texts {
+                assert_eq!(named(text), expected, "{text}");
+            }
+        }
+
+        #[test]
+        fn clients_of_rosbridge_subscribe_and_unsubscribe() {
+            let stated = |text| bridged(text);
+            assert_eq!(
+                stated("[Client 0] Subscribed to /odom"),
+                Some((true, "/odom"))
+            );
+            let gone = "[Client 3f-2] Unsubscribed from /odom";
+            assert_eq!(stated(gone), Some((false, "/odom")));
+            assert_eq!(stated("Subscribed to /odom"), None);
+            assert_eq!(stated("[Client 0] Subscribed to nothing"), None);
+        }
+
+        #[test]
+        fn names_are_resolved_relative_to_their_node() {
+            assert_eq!(resolved("odom", "/r1/base"), "/r1/odom");
+            assert_eq!(resolved("odom", "/base"), "/odom");
+            assert_eq!(resolved("~/odom", "/r1/base"), "/r1/base/odom");
+            assert_eq!(resolved("/odom", "/r1/base"), "/odom");
         }
     }
 
-    #[test]
-    fn clients_of_rosbridge_subscribe_and_unsubscribe() {
-        let stated = |text| bridged(text);
-        assert_eq!(
-            stated("[Client 0] Subscribed to /odom"),
-            Some((true, "/odom"))
-        );
-        let gone = "[Client 3f-2] Unsubscribed from /odom";
-        assert_eq!(stated(gone), Some((false, "/odom")));
-        assert_eq!(stated("Subscribed to /odom"), None);
-        assert_eq!(stated("[Client 0] Subscribed to nothing"), None);
+    mod duplicates {
+        use super::super::*;
+
+        #[test]
+        fn both_texts_name_the_node() {
+            let said = |logger: &str, text| {
+                doubled(&LogRecord {
+                    logger: logger.to_owned(),
+                    text,
+                    ..LogRecord::default()
+                })
+            };
+            let old = "Publisher already registered for provided node name. If this is due to";
+            let new = "Publisher already registered for node name: 'r1.talker'. If this is due to";
+            let ros1 =
+                "Reason given for shutdown: [[/talker] Reason: new node registered with same name]";
+            assert_eq!(said("/talker", old).as_deref(), Some("/talker"));
+            assert_eq!(said("/rcl/logging_rosout", old), None);
+            assert_eq!(
+                said("/rcl/logging_rosout", new).as_deref(),
+                Some("/r1/talker")
+            );
+            assert_eq!(said("/talker", ros1).as_deref(), Some("/talker"));
+            assert_eq!(said("/talker", "hello"), None);
+        }
     }
 
-    #[test]
-    fn names_are_resolved_relative_to_their_node() {
-        assert_eq!(resolved("odom", "/r1/base"), "/r1/odom");
-        assert_eq!(resolved("odom", "/base"), "/odom");
-        assert_eq!(resolved("~/odom", "/r1/base"), "/r1/base/odom");
-        assert_eq!(resolved("/odom", "/r1/base"), "/odom");
+    mod links {
+        use super::super::*;
+
+        #[test]
+        fn a_subscriber_comes_and_goes() {
+            let text = "Connection: Creating TransportSubscriberLink for topic [/scan] connected to \
+                    [callerid=[/slam] address=[TCPROS connection on port 1 to [127.0.0.1:2 on socket 3]]]";
+            let slam = |how| {
+                Some(LoggedSubscription {
+                    node: Some("/slam"),
+                    topic: "/scan",
+                    how,
+                })
+            };
+            assert_eq!(link(text), slam(How::Begins));
+            let text =
+                "Connection to subscriber [callerid=[/slam] address=[…]] to topic [/scan] dropped";
+            assert_eq!(link(text), slam(How::Ends));
+        }
+
+        #[test]
+        fn a_client_of_another_type_wants_to_subscribe() {
+            let text = "Client [/bad] wants topic /scan to have datatype/md5sum [a/b], but our version has [c/d].";
+            assert_eq!(
+                link(text),
+                Some(LoggedSubscription {
+                    node: Some("/bad"),
+                    topic: "/scan",
+                    how: How::Refused
+                })
+            );
+        }
+
+        #[test]
+        fn a_lost_publisher_reveals_the_loggers_subscription() {
+            let text = "Retrying connection to [127.0.0.1:4] for topic [/scan]";
+            assert_eq!(
+                link(text),
+                Some(LoggedSubscription {
+                    node: None,
+                    topic: "/scan",
+                    how: How::Lasts
+                })
+            );
+            assert_eq!(link("Retrying connection to [127.0.0.1:4]"), None);
+            assert_eq!(link("hello"), None);
+        }
     }
 }

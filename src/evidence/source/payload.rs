@@ -1,5 +1,6 @@
 //! Messages forwarded byte by byte (relay, throttle, mux, drop, republish): the node that publishes the
-//! copies subscribes to the topic that had them first.
+//! copies subscribes to the topic that had them first; and the choice that a mux reports. For example, 500 of 500 messages of
+//! `/cmd_vel` have the bytes of messages of `/nav_vel` just before, so the publisher of `/cmd_vel` subscribes to `/nav_vel`.
 //!
 //! The length and the first bytes are compared, by a hash; content that is repeated in its own topic (an
 //! empty message, a constant) is not significant and is counted once. The budget is that of
@@ -11,25 +12,29 @@ use std::hash::BuildHasher as _;
 use foldhash::quality::FixedState;
 use foldhash::{HashMap, HashSet};
 
-use super::SourceContext;
+use crate::base::ids::ById;
 use crate::base::name::LOGS;
 use crate::base::rhythm::FEWEST_OF_SENDER;
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
 use crate::evidence::observation::{Name, SourceId};
+use crate::evidence::source::SourceContext;
 use crate::evidence::spread::Spread;
 
-/// The fewest equal messages that are significant.
+/// The fewest equal messages that are significant: fewer short ones may be equal by chance.
 const FEWEST: u64 = 10;
-/// The share, in per cent, of an output's different messages that must be copies.
+/// The share, in per cent, of an output's different messages that must be copies: a relay sends nothing else, but the
+/// recorder may have lost some originals.
 const SHARE: u64 = 90;
-/// The least ratio of the number of times that the input comes first to that of the output.
+/// The least ratio of the number of times that the input comes first to that of the output: the recorder receives some
+/// copies before their originals, but not most of them.
 const FIRST: u64 = 3;
 /// The most flows that have a content at once; with more it is a constant.
 const MOST_AT_ONCE: usize = 32;
 /// The most runs of a flow that are kept: a mux that switches more often forwards several inputs at once.
 const MOST_RUNS: usize = 4096;
-/// The longest time in which a message is forwarded, in nanoseconds.
+/// The longest time in which a message is forwarded, in nanoseconds: with more, a constant that is sent now and
+/// then would count as forwarded.
 const RECENT_NS: i64 = 2_000_000_000;
 
 /// The number of bytes of a payload that are compared: a header's stamp and the first lines of an image are among them.
@@ -53,7 +58,7 @@ pub(crate) fn collect(context: &mut SourceContext<'_>, beginning: &[u8], size: u
 type PayloadFlow = (Name, Option<Name>);
 
 /// The equal messages of two flows.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Default)]
 struct PayloadPair {
     /// The number of messages that the input had before the output.
     before: u64,
@@ -61,7 +66,7 @@ struct PayloadPair {
 }
 
 /// Messages of an output in a row that all come from one input, and only from it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Run {
     input: usize,
     first: Stamp,
@@ -69,39 +74,39 @@ struct Run {
 }
 
 /// The result of one pass over all messages.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct Matches {
     pairs: BTreeMap<(usize, usize), PayloadPair>,
     /// By flow: the number of its different messages that were seen before in exactly these other flows.
-    origins: BTreeMap<usize, BTreeMap<Vec<usize>, u64>>,
-    distinct: BTreeMap<usize, u64>,
+    origins: ById<usize, BTreeMap<Vec<usize>, u64>>,
+    distinct: ById<usize, u64>,
     /// By flow: the number of its messages that another one had just after it, as the recorder may receive a
     /// copy first.
-    later: BTreeMap<usize, BTreeMap<usize, u64>>,
+    later: ById<usize, BTreeMap<usize, u64>>,
     /// By flow, in order.
-    runs: BTreeMap<usize, Vec<Run>>,
+    runs: ById<usize, Vec<Run>>,
 }
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let (flows, matches) = matches(known);
-    for (output, total) in &matches.distinct {
-        let (basis, sender) = flows[*output];
+    for (output, total) in matches.distinct.with_ids().filter(|(_, total)| **total > 0) {
+        let (basis, sender) = flows[output];
         let Some(node) = sender.or_else(|| known.only_publisher(basis)) else {
             continue;
         };
-        let inputs = inputs(known, &flows, &matches, *output, node);
-        let copied = copied(&matches, *output, &inputs);
+        let inputs = inputs(known, &flows, &matches, output, node);
+        let copied = copied(&matches, output, &inputs);
         if copied < FEWEST || copied * 100 < total * SHARE {
             continue;
         }
         known.copies.insert((node, basis));
-        let inputs = nearest(&matches, *output, &inputs);
-        turns(source, known, &flows, &matches, (*output, &inputs));
+        let inputs = nearest(&matches, output, &inputs);
+        turns(source, known, &flows, &matches, (output, &inputs));
         for input in inputs {
             let topic = flows[input].0;
             let what = ElementKey::Subscribe(topic, node);
             known.infer(source, what, ElementKey::Publish(node, basis), |known| {
-                let count = matches.pairs[&(input, *output)].before;
+                let count = matches.pairs[&(input, output)].before;
                 let [from, to] = [topic, basis].map(|n| known.text(n));
                 format!(
                     "{count} of {total} different messages of {to} are byte by byte those of {from} just before"
@@ -119,7 +124,7 @@ fn turns(
     matches: &Matches,
     (output, inputs): (usize, &[usize]),
 ) {
-    let runs = matches.runs.get(&output).into_iter().flatten();
+    let runs = matches.runs.of(output).iter();
     let runs: Vec<&Run> = runs
         .filter(|run| run.count >= FEWEST_OF_SENDER && inputs.contains(&run.input))
         .collect();
@@ -128,23 +133,19 @@ fn turns(
         .filter(|pair| pair[0].input != pair[1].input)
     {
         let [from, to] = [pair[0], pair[1]].map(|run| flows[run.input].0);
-        let (what, kind) = (
-            ElementKey::Topic(flows[output].0),
-            IncidentKind::Turn(from, to),
-        );
-        known.incident(source, what, kind, pair[1].first);
+        let what = ElementKey::Topic(flows[output].0);
+        known.incident(source, what, IncidentKind::Turn(from, to), pair[1].first);
     }
 }
 
 /// Processes all messages in order of time.
 fn matches(known: &mut Conclusions<'_>) -> (Vec<PayloadFlow>, Matches) {
     let mut topics: BTreeMap<String, BTreeSet<Name>> = BTreeMap::new();
-    for at in known.facts.payloads.keys() {
-        let topic = known.streams[*at].topic;
+    for (at, _) in known.facts.payloads.somes() {
+        let topic = known.streams[at].topic;
         topics.entry(known.kind(topic)).or_default().insert(topic);
     }
-    let kept = known.facts.payloads.clone();
-    let kept = kept.into_iter().filter(|(at, _)| {
+    let kept = known.facts.payloads.somes().filter(|(at, _)| {
         let stream = &known.streams[*at];
         // The only topic of its type is not a copy of another, and log records are forwarded by a known node.
         let alike = topics.get(&known.kind(stream.topic));
@@ -178,7 +179,7 @@ fn matches(known: &mut Conclusions<'_>) -> (Vec<PayloadFlow>, Matches) {
 }
 
 /// The pass over all messages.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct PayloadWalk {
     found: Matches,
     /// The contents that each flow had so far.
@@ -204,13 +205,13 @@ impl PayloadWalk {
         if !self.seen.insert((flow, hash)) {
             return;
         }
-        *self.found.distinct.entry(flow).or_default() += 1;
+        *self.found.distinct.grown(flow) += 1;
         let owners = self.recent.entry(hash).or_default();
         if owners.len() >= MOST_AT_ONCE {
             return;
         }
         for (_, other) in owners.iter().filter(|(t, f)| *t < time && *f != flow) {
-            let later = self.found.later.entry(*other).or_default();
+            let later = self.found.later.grown(*other);
             *later.entry(flow).or_default() += 1;
         }
         let mut origins = Vec::new();
@@ -221,7 +222,7 @@ impl PayloadWalk {
             origins.push(*input);
         }
         if let [input] = origins[..] {
-            let runs = self.found.runs.entry(flow).or_default();
+            let runs = self.found.runs.grown(flow);
             let is_more = runs.len() < MOST_RUNS;
             match runs.last_mut() {
                 Some(run) if run.input == input => run.count += 1,
@@ -235,13 +236,8 @@ impl PayloadWalk {
         }
         if !origins.is_empty() {
             origins.sort_unstable();
-            *self
-                .found
-                .origins
-                .entry(flow)
-                .or_default()
-                .entry(origins)
-                .or_default() += 1;
+            let of = self.found.origins.grown(flow);
+            *of.entry(origins).or_default() += 1;
         }
         owners.push((time, flow));
         self.queue.push_back((time, hash));
@@ -259,7 +255,7 @@ fn inputs(
 ) -> Vec<usize> {
     let before = |a, b| matches.pairs.get(&(a, b)).map_or(0, |pair| pair.before);
     let (to, _) = flows[output];
-    let own = matches.origins.get(&output).into_iter().flatten();
+    let own = matches.origins.get(output).into_iter().flatten();
     let from: BTreeSet<usize> = own.flat_map(|(from, _)| from).copied().collect();
     let mut inputs = Vec::new();
     for input in from {
@@ -281,14 +277,14 @@ fn inputs(
 
 /// The number of different messages of an output that one of these inputs had just before, or just after.
 fn copied(matches: &Matches, output: usize, inputs: &[usize]) -> u64 {
-    let origins = matches.origins.get(&output).into_iter().flatten();
+    let origins = matches.origins.get(output).into_iter().flatten();
     let before = origins.filter(|(from, _)| from.iter().any(|f| inputs.contains(f)));
-    let later = matches.later.get(&output).into_iter().flatten();
+    let later = matches.later.get(output).into_iter().flatten();
     let later = later.filter(|(input, _)| inputs.contains(input));
     let all = before
         .map(|(_, count)| count)
         .chain(later.map(|(_, count)| count));
-    all.sum::<u64>().min(matches.distinct[&output])
+    all.sum::<u64>().min(matches.distinct[output])
 }
 
 /// The nearer of two inputs with the same messages, which are on one path: the one whose lag clearly varies
@@ -296,7 +292,7 @@ fn copied(matches: &Matches, output: usize, inputs: &[usize]) -> u64 {
 fn nearest(matches: &Matches, output: usize, inputs: &[usize]) -> Vec<usize> {
     let pair = |input: usize| matches.pairs[&(input, output)];
     let together = |a: usize, b: usize| -> u64 {
-        let origins = matches.origins.get(&output).into_iter().flatten();
+        let origins = matches.origins.get(output).into_iter().flatten();
         let both = origins.filter(|(from, _)| from.contains(&a) && from.contains(&b));
         both.map(|(_, count)| count).sum()
     };
@@ -308,6 +304,81 @@ fn nearest(matches: &Matches, output: usize, inputs: &[usize]) -> Vec<usize> {
         .copied()
         .filter(|a| rivals(*a).all(|b| !is_path(*a, b) || beats(*a, b)))
         .collect()
+}
+
+// The choice that a mux reports on `<mux>/selected`: it subscribes to that topic and forwards it from then on.
+
+/// The name of the topic below that of the mux.
+const SELECTED: &str = "/selected";
+
+pub(crate) fn conclude_selected(source: SourceId, known: &mut Conclusions<'_>) {
+    let is_report = |topic: &Name| known.text(*topic).ends_with(SELECTED);
+    let reports = known.topics_of(|kind| kind == "std_msgs/String");
+    let reports: Vec<Name> = reports.into_iter().filter(is_report).collect();
+    if reports.is_empty() {
+        return;
+    }
+    let (_, shown) = known.facts.logged.sorted();
+    for report in reports {
+        let text = known.text(report);
+        let node = known.facts.known(text.trim_end_matches(SELECTED));
+        let Some(node) = node.filter(|node| known.nodes().contains(node)) else {
+            continue;
+        };
+        let of_report = shown
+            .iter()
+            .filter(|value| known.streams[value.stream].topic == report);
+        let chosen =
+            of_report.filter_map(|value| Some((value.time, known.facts.known(&value.value)?)));
+        let chosen: Vec<(Stamp, Name)> = chosen.collect();
+        for output in outputs(known, node) {
+            select(source, known, (node, output), &chosen);
+        }
+    }
+}
+
+/// The topics that a node publishes besides its reports and its log.
+fn outputs(known: &Conclusions<'_>, node: Name) -> Vec<Name> {
+    let own = known.publications().filter(|(of, _)| *of == node);
+    let topics = own.map(|(_, topic)| topic);
+    let is_recorded = |topic: &Name| known.is_recorded(*topic);
+    topics.filter(is_recorded).collect()
+}
+
+/// Adds the inputs of a mux that have the type of its output, and the times at which it switches from one to
+/// another.
+fn select(
+    source: SourceId,
+    known: &mut Conclusions<'_>,
+    (node, output): (Name, Name),
+    chosen: &[(Stamp, Name)],
+) {
+    let kind = known.kind(output);
+    let is_input =
+        |topic: Name| topic != output && known.is_recorded(topic) && known.kind(topic) == kind;
+    let inputs: Vec<(Stamp, Name)> = chosen
+        .iter()
+        .copied()
+        .filter(|(_, t)| is_input(*t))
+        .collect();
+    for (_, input) in &inputs {
+        let what = ElementKey::Subscribe(*input, node);
+        known.infer(source, what, ElementKey::Publish(node, output), |known| {
+            format!(
+                "{} reports that it forwards {}",
+                known.text(node),
+                known.text(*input)
+            )
+        });
+    }
+    let what = ElementKey::Topic(output);
+    if known.incidents.iter().any(|incident| incident.what == what) {
+        return;
+    }
+    for pair in inputs.windows(2).filter(|pair| pair[0].1 != pair[1].1) {
+        let turn = IncidentKind::Turn(pair[0].1, pair[1].1);
+        known.incident(source, what, turn, pair[1].0);
+    }
 }
 
 #[cfg(test)]
@@ -336,7 +407,7 @@ mod tests {
             (1, 21, 8),
         ]);
         assert_eq!(found.pairs[&(0, 1)].before, 2);
-        assert_eq!(found.distinct, [(0, 2), (1, 2)].into());
+        assert_eq!(found.distinct, vec![2, 2].into());
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::observation::{Confidence, Observation, SourceId};
 
 /// The quality of service that one publisher offers.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Offer {
     reliability: &'static str,
     durability: &'static str,
@@ -30,7 +30,7 @@ pub(crate) fn announced(context: &mut SourceContext<'_>) {
     let mut offers = offers(&text);
     offers.sort();
     if let Ok(count @ 1..) = u32::try_from(offers.len()) {
-        context.facts.offers.insert(context.place, count);
+        *context.facts.offers.grown(context.place) = count;
     }
     let same = offers.chunk_by(|a, b| a == b).map(|same| {
         let times = if same.len() > 1 {
@@ -48,11 +48,9 @@ pub(crate) fn announced(context: &mut SourceContext<'_>) {
     let words = same.collect::<Vec<_>>().join(", ");
     if !words.is_empty() {
         let (topic, quality) = (context.stream.topic, context.name(&words));
-        context.observation(
-            Observation::Quality(topic, quality),
-            Confidence::Declared,
-            || format!("offered as {words}"),
-        );
+        let offered = || format!("offered as {words}");
+        let stated = Observation::Quality(topic, quality);
+        context.observation(stated, Confidence::Declared, offered);
     }
 }
 
@@ -61,12 +59,8 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for fact in known.observed(source) {
         if let Observation::Quality(topic, _) = fact.observation {
             let what = ElementKey::Topic(topic);
-            known.add(Inference::new(
-                source,
-                what,
-                Confidence::Declared,
-                Validity::Whole,
-            ));
+            let when = Validity::Whole;
+            known.add(Inference::new(source, what, Confidence::Declared, when));
         }
     }
 }

@@ -1,12 +1,16 @@
-//! The recorder subscribes to every recorded topic; views hide it unless requested.
+//! The recorder: it subscribes to every recorded topic (views hide it unless requested), and states which messages it lost.
 
 use std::collections::BTreeSet;
 
-use super::SourceContext;
+use crate::base::ids::ById;
 use crate::base::name::is_recorder;
-use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
+use crate::base::time::Stamp;
+use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind, Inference, Validity};
+use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::dynamic::MessageLayout;
 use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
+use crate::evidence::source::SourceContext;
 
 /// The ends of the recorder's source paths: of `rosbag` and of `rosbag2_transport`.
 const FILES: [&str; 2] = ["/src/recorder.cpp", "/rosbag2_transport/recorder.cpp"];
@@ -34,12 +38,8 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let recorders: BTreeSet<Name> = stated.chain(named).collect();
     for recorder in &recorders {
         let what = ElementKey::Node(*recorder);
-        known.add(Inference::new(
-            source,
-            what,
-            Confidence::Stated,
-            Validity::Unending,
-        ));
+        let when = Validity::Unending;
+        known.add(Inference::new(source, what, Confidence::Stated, when));
     }
     if recorders.len() != 1 {
         return;
@@ -50,6 +50,67 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             let what = ElementKey::Subscribe(*topic, recorder);
             let when = Validity::Like(ElementKey::Topic(*topic));
             known.add(Inference::new(source, what, Confidence::Stated, when));
+        }
+    }
+}
+
+// `/events/rosbag2_messages_lost`: messages that the recorder itself lost, so that a gap is not attributed
+// to the robot.
+
+/// `rosbag2_interfaces/msg/MessagesLostEvent`.
+pub(crate) const LOST: MessageLayout = MessageLayout::ros2(
+    "rosbag2_interfaces/MessagesLostEvent",
+    &[
+        (
+            "",
+            "string node_name;MessagesLostEventTopicStat[] messages_lost_statistics",
+        ),
+        (
+            "MessagesLostEventTopicStat",
+            "string topic_name;uint64 messages_lost_in_transport;uint64 messages_lost_in_recorder",
+        ),
+    ],
+);
+
+pub(crate) fn read_lost(
+    context: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
+    let recorder = payload.string()?;
+    let mut all = Vec::new();
+    for _ in 0..payload.length(20)? {
+        all.push((payload.string()?, payload.u64()?, payload.u64()?));
+    }
+    payload.finish()?;
+    for (topic, in_transport, in_recorder) in all {
+        let lost = in_transport.saturating_add(in_recorder);
+        let (of, many) = (context.name(topic), context.name(&lost.to_string()));
+        context.states(Observation::Lost(of, many), || {
+            format!("{recorder} lost {in_transport} messages of {topic} in transport and {in_recorder} itself")
+        });
+    }
+    Ok(())
+}
+
+/// Adds the losses; consecutive reports are combined.
+pub(crate) fn conclude_lost(source: SourceId, known: &mut Conclusions<'_>) {
+    let mut lost: ById<Name, Vec<(Stamp, u64)>> = ById::default();
+    for fact in known.facts.list.clone() {
+        if let Observation::Lost(topic, many) = fact.observation
+            && known.is_recorded(topic)
+            && let Ok(many @ 1..) = known.text(many).parse::<u64>()
+        {
+            let times = known.times(&fact).into_iter();
+            lost.grown(topic).extend(times.map(|time| (time, many)));
+        }
+    }
+    for reports in lost.iter_mut() {
+        reports.sort_unstable();
+    }
+    for (topic, reports) in lost.with_ids() {
+        for (time, many) in reports {
+            let what = ElementKey::Topic(topic);
+            known.incident(source, what, IncidentKind::Lost(*many), *time);
         }
     }
 }

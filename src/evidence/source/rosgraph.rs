@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 use super::SourceContext;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::message::definition::MessageLayout;
+use crate::evidence::message::dynamic::MessageLayout;
 use crate::evidence::message::dynamic::{MessageSchema, MessageValue};
 use crate::evidence::observation::{Name, Observation, SourceId};
 

@@ -1,17 +1,18 @@
-//! Log records of ROS 1: a node is running, and the topics it names as its own.
+//! Log records: a node is running, and the topics it names as its own.
 //!
 //! roscpp lists the topics that the node publishes, rospy also those it subscribes to; a node uses rospy if
-//! any of its records comes from a Python file.
+//! any of its records comes from a Python file. Records of ROS 2 name loggers only.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
-use super::SourceContext;
 use crate::base::name::{LOGS, in_space, is_log, is_player};
 use crate::base::rhythm::FIRST_RECORD;
 use crate::base::role::role;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
 use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Confidence, Name, Observation, Observations, SourceId};
+use crate::evidence::source::SourceContext;
 
 pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
     let (name, text) = (record.name, record.text);
@@ -191,6 +192,102 @@ fn names_all(known: &Conclusions<'_>, named: &BTreeSet<Name>) -> bool {
     let recorded: BTreeSet<Name> = known.streams.iter().map(|s| s.topic).collect();
     let is_played = known.streams.iter().any(|s| s.trust == Reliability::Player);
     !named.is_empty() && !is_played && recorded.into_iter().filter(unnamed).count() <= 1
+}
+
+// Log records of ROS 2: a node is running. Dots represent slashes; the loggers of a node's parts count as the node.
+
+pub(crate) fn read_ros2(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
+    if record.name.is_empty() {
+        return;
+    }
+    let logger = context.name(&record.logger);
+    let topic = context.stream.topic;
+    context.states(Observation::Logger(logger, topic), || {
+        format!("logger {}: {}", record.name, record.text)
+    });
+}
+
+/// Parts of ROS 2 itself that log below the name of their node.
+const PARTS: [&str; 5] = [
+    "rclcpp",
+    "rcl",
+    "rclcpp_action",
+    "rclcpp_lifecycle",
+    "tf2_ros",
+];
+
+/// A logger is a part of the nearest node or logger above it, and a node if there is none; the node publishes the log.
+pub(crate) fn conclude_ros2(source: SourceId, known: &mut Conclusions<'_>) {
+    let observations = known.observations(source);
+    let loggers = observations
+        .iter()
+        .filter_map(|(fact, signs, _)| match fact.observation {
+            Observation::Logger(name, topic) => Some((known.text(name), topic, signs.clone())),
+            _ => None,
+        });
+    let mut loggers: Vec<_> = loggers.collect();
+    loggers.sort_by(|a, b| a.0.cmp(&b.0));
+    let mut nodes: BTreeSet<Arc<str>> = known.nodes().iter().map(|n| known.text(*n)).collect();
+    for (logger, topic, signs) in loggers {
+        let node = owner(&logger, &nodes);
+        nodes.insert(node.into());
+        let what = ElementKey::Publish(known.facts.name(node), topic);
+        let when = Validity::Signs {
+            signs,
+            ends: Vec::new(),
+        };
+        known.add(Inference::new(source, what, Confidence::Stated, when));
+    }
+}
+
+/// The node that a logger belongs to. Shorter names come first, so that a part finds its node.
+fn owner<'a>(logger: &'a str, nodes: &BTreeSet<Arc<str>>) -> &'a str {
+    let mut above = logger;
+    while !above.is_empty() {
+        if nodes.contains(above) {
+            return above;
+        }
+        above = &above[..above.rfind('/').unwrap_or(0)];
+    }
+    match logger.rsplit_once('/') {
+        Some((node, part)) if !node.is_empty() && PARTS.contains(&part) => node,
+        _ => logger,
+    }
+}
+
+// Every node of ROS 1 publishes `/rosout`, mostly silently; the node `/rosout` subscribes to it and publishes
+// `/rosout_agg`.
+
+pub(crate) fn conclude_rule(source: SourceId, known: &mut Conclusions<'_>) {
+    if !known.is_ros1() || known.nodes().is_empty() {
+        return;
+    }
+    // Each recording in a namespace has its own master.
+    for space in known.facts.spaces.clone() {
+        add_rule(source, known, &space);
+    }
+}
+
+/// Adds the log of the nodes whose recording lies in a namespace.
+fn add_rule(source: SourceId, known: &mut Conclusions<'_>, space: &str) {
+    let own = |node: &str| {
+        let spaces = known.facts.spaces.iter().map(String::as_str);
+        let around = spaces.filter(|of| !of.is_empty() && in_space(of, node) == node);
+        around.max_by_key(|of| of.len()).unwrap_or_default() == space
+    };
+    let nodes = known.nodes().iter().copied();
+    let nodes: Vec<Name> = nodes.filter(|node| own(&known.text(*node))).collect();
+    let [log, all] = LOGS.map(|name| known.facts.name(&in_space(space, name)));
+    let rule = |what, when| Inference::new(source, what, Confidence::Inferred, when);
+    for node in nodes {
+        if node != log {
+            let when = Validity::Like(ElementKey::Node(node));
+            known.add(rule(ElementKey::Publish(node, log), when));
+        }
+    }
+    known.add(rule(ElementKey::Node(log), Validity::Always));
+    known.add(rule(ElementKey::Publish(log, all), Validity::Always));
+    known.add(rule(ElementKey::Subscribe(log, log), Validity::Always));
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use super::SourceContext;
 use crate::base::digest::hex_of;
 use crate::base::name::SERVICE;
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::message::definition::MessageLayout;
+use crate::evidence::message::dynamic::MessageLayout;
 use crate::evidence::observation::{Confidence, Observation};
 
 /// `<service type>_Event`: it begins with `service_msgs/msg/ServiceEventInfo`, with any fields after it.

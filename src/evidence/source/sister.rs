@@ -1,14 +1,16 @@
 //! Sister namespaces: if a node's twin in another namespace publishes the same topics there and is known to
-//! subscribe to one, the node subscribes to it too.
+//! subscribe to one, the node subscribes to it too. For example, `/r1/nav` and `/r2/nav` publish `plan` and `status` in their
+//! namespaces, and `/r1/nav` is known to subscribe to `/r1/scan`: `/r2/nav` subscribes to `/r2/scan`.
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::base::ids::ById;
 use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::observation::{Name, SourceId};
 
 /// The fewest topics of their namespace that twins publish: one alone may be chance.
 const FEWEST: usize = 2;
-/// The most twins that are compared one by one.
+/// The most twins that are compared one by one, since the work is the square of it.
 const MOST: usize = 200;
 
 /// A node with its namespace, and the topics it publishes inside it.
@@ -36,12 +38,12 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
 
 /// The nodes that share their last part, each with its namespace and publications.
 fn families(known: &Conclusions<'_>) -> BTreeMap<String, Vec<Twin>> {
-    let mut published: BTreeMap<Name, Vec<Name>> = BTreeMap::new();
+    let mut published: ById<Name, Vec<Name>> = ById::default();
     for (node, topic) in known.publications() {
-        published.entry(node).or_default().push(topic);
+        published.grown(node).push(topic);
     }
     let mut families: BTreeMap<String, Vec<Twin>> = BTreeMap::new();
-    for (node, topics) in published {
+    for (node, topics) in published.with_ids() {
         let name = known.text(node);
         let Some((space, last)) = name.rsplit_once('/').filter(|(space, _)| !space.is_empty())
         else {

@@ -46,7 +46,7 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
 
 /// The known publishers of a topic.
 fn publishers(context: &LogInput<'_>, topic: Name) -> Vec<NodeId> {
-    let topic = context.history.topic_ids.get(&topic);
+    let topic = context.history.topic_ids.some(topic);
     let edges = context.elements.publishes.iter();
     let own = edges.filter(|edge| Some(&edge.topic) == topic && !edge.seen.evidence.is_guess());
     own.map(|edge| edge.node).collect()

@@ -1,0 +1,1146 @@
+//! Launch files in Python, parsed but never run: the result of `generate_launch_description` becomes a tree like that
+//! of the XML format, with `$(…)` for values that the launch system would substitute.
+//!
+//! Statements are evaluated statically: assignments, literal lists, loops over them, functions of the file. If a condition is
+//! unknown, both branches are followed and their results marked as undecided. `action` knows the actions of launch.
+
+mod action;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use crate::base::budget::LaunchWork;
+use crate::base::error::{Error, Result};
+use crate::evidence::given::substitution::LONGEST;
+use crate::evidence::given::tree::Tree;
+use crate::evidence::syntax::{Language, Node, Parsed, children, line};
+
+use PythonValue::{Bool, Dict, Function, List, Number, Text, Unknown};
+
+/// The tag of an element that is only known at run time.
+pub(super) const UNREAD: &str = "unread";
+
+const HINT: &str = "a launch file in Python defines `generate_launch_description` and returns a `LaunchDescription`";
+
+/// The tree of a launch file in Python.
+pub(super) fn of_python(path: &Path, text: &str) -> Result<Tree> {
+    let Some(parsed) = Parsed::new(Language::Python, text.to_owned()) else {
+        let reason = "it is too complex to be read";
+        return Err(Error::bad_file(path, 0, reason, HINT));
+    };
+    let mut evaluator = Evaluator::new(&parsed, BTreeMap::new());
+    let Some(actions) = evaluator.launch_description() else {
+        let reason = "there is no `generate_launch_description`";
+        return Err(Error::bad_file(path, 0, reason, HINT));
+    };
+    Ok(Tree {
+        tag: "launch".to_owned(),
+        children: action::trees(&actions),
+        ..Tree::default()
+    })
+}
+
+/// The value of a Python expression as a text (`$(eval …)`, `PythonExpression`) in which `names` have these texts;
+/// `None` if it is only known at run time.
+pub(super) fn evaluate(expression: &str, names: &BTreeMap<String, String>) -> Option<String> {
+    match value(expression, names)? {
+        // XML puts quotes around the whole expression.
+        Text(text) => match value(&text, names) {
+            Some(Bool(is_true)) => Some(word(is_true)),
+            _ => Some(text).filter(|text| !text.contains("$(")),
+        },
+        Bool(is_true) => Some(word(is_true)),
+        other => other.text(),
+    }
+}
+
+fn value(expression: &str, names: &BTreeMap<String, String>) -> Option<PythonValue> {
+    let parsed = Parsed::new(Language::Python, format!("({expression})"))?;
+    let texts = names
+        .iter()
+        .map(|(name, text)| (name.clone(), of_text(text)));
+    Evaluator::new(&parsed, texts.collect()).whole()
+}
+
+/// A value that is only known at run time.
+fn unknown(at: Node<'_>) -> PythonValue {
+    Unknown(line(at))
+}
+
+fn word(is_true: bool) -> String {
+    if is_true { "true" } else { "false" }.to_owned()
+}
+
+// Statements.
+
+/// The deepest nesting of expressions and calls that is followed, which the stack must hold.
+const NESTED: usize = 120;
+
+/// The cost of one step, in bytes of work: as that of so much text.
+const STEP: usize = 16;
+
+struct Evaluator<'a> {
+    parsed: &'a Parsed,
+    frames: Vec<Locals>,
+    functions: BTreeMap<String, Node<'a>>,
+    budget: LaunchWork,
+    /// The number of enclosing unknown conditions.
+    undecided: usize,
+    nested: usize,
+}
+
+/// The variables of a function that is being followed.
+#[derive(Default)]
+struct Locals {
+    names: BTreeMap<String, PythonValue>,
+    returned: Option<PythonValue>,
+    /// The value of `undecided` where the function was called.
+    undecided: usize,
+}
+
+/// The continuation after a statement.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum ControlFlow {
+    Next,
+    Done,
+}
+
+impl<'a> Evaluator<'a> {
+    fn new(parsed: &'a Parsed, names: BTreeMap<String, PythonValue>) -> Self {
+        let global = Locals {
+            names,
+            ..Locals::default()
+        };
+        Self {
+            parsed,
+            frames: vec![global],
+            functions: BTreeMap::new(),
+            budget: LaunchWork::of_text(parsed.text.len()),
+            undecided: 0,
+            nested: 0,
+        }
+    }
+
+    /// The return value of `generate_launch_description`; `None` if there is no such function.
+    fn launch_description(&mut self) -> Option<PythonValue> {
+        self.run(self.parsed.root());
+        let function = *self.functions.get("generate_launch_description")?;
+        Some(self.call(function, &[], &[]))
+    }
+
+    /// The value of the file's only expression; `None` if there is none or it is unknown.
+    fn whole(&mut self) -> Option<PythonValue> {
+        let statement = children(self.parsed.root());
+        let expression = statement.first().and_then(|s| s.named_child(0))?;
+        if self.parsed.root().has_error() || statement.len() != 1 {
+            return None;
+        }
+        Some(self.value(expression)).filter(|value| !matches!(value, Unknown(_)))
+    }
+
+    fn text(&self, node: Node<'_>) -> &'a str {
+        self.parsed.text(node)
+    }
+
+    /// Returns a new value, or unknown if it is too large, too deep or exceeds the budget.
+    fn kept(&mut self, value: PythonValue, at: Node<'_>) -> PythonValue {
+        let (size, depth) = value.measure();
+        let is_small = depth <= DEEPEST && !matches!(&value, Text(text) if text.len() > LONGEST);
+        match self.budget.spend(size) {
+            Some(()) if is_small => value,
+            _ => unknown(at),
+        }
+    }
+
+    fn run(&mut self, block: Node<'a>) -> ControlFlow {
+        for statement in children(block) {
+            if self.statement(statement) == ControlFlow::Done {
+                return ControlFlow::Done;
+            }
+        }
+        ControlFlow::Next
+    }
+
+    fn statement(&mut self, node: Node<'a>) -> ControlFlow {
+        if self.budget.spend(STEP).is_none() || self.nested > NESTED {
+            return ControlFlow::Done;
+        }
+        self.nested += 1;
+        let flow = match node.kind() {
+            "expression_statement" => {
+                for expression in children(node) {
+                    self.effect(expression);
+                }
+                ControlFlow::Next
+            }
+            "function_definition" => {
+                if let Some(name) = node.child_by_field_name("name") {
+                    self.functions.insert(self.text(name).to_owned(), node);
+                }
+                ControlFlow::Next
+            }
+            "decorated_definition" => {
+                let definition = node.child_by_field_name("definition");
+                definition.map_or(ControlFlow::Next, |inner| self.statement(inner))
+            }
+            "return_statement" => self.returns(node),
+            "if_statement" => self.branches(node),
+            "for_statement" => self.repeats(node),
+            "with_statement" | "try_statement" => {
+                let body = node.child_by_field_name("body");
+                body.map_or(ControlFlow::Next, |body| self.run(body))
+            }
+            _ => ControlFlow::Next,
+        };
+        self.nested -= 1;
+        flow
+    }
+
+    fn returns(&mut self, node: Node<'a>) -> ControlFlow {
+        let value = node
+            .named_child(0)
+            .map_or(PythonValue::None, |n| self.value(n));
+        let undecided = self.undecided;
+        let Some(frame) = self.frames.last_mut() else {
+            return ControlFlow::Done;
+        };
+        let is_sure = undecided == frame.undecided;
+        frame.returned = Some(match (frame.returned.take(), value) {
+            (None, value) if is_sure || value.acts() => value,
+            (Some(List(mut before)), after) if after.acts() => {
+                before.push(after);
+                List(before)
+            }
+            (Some(before), after) if before.acts() && after.acts() => List(vec![before, after]),
+            _ => unknown(node),
+        });
+        if is_sure {
+            ControlFlow::Done
+        } else {
+            ControlFlow::Next
+        }
+    }
+
+    fn branches(&mut self, node: Node<'a>) -> ControlFlow {
+        let mut cursor = node.walk();
+        let others: Vec<Node<'a>> = node
+            .children_by_field_name("alternative", &mut cursor)
+            .collect();
+        let mut sure = true;
+        let mut flow = ControlFlow::Next;
+        for part in std::iter::once(node).chain(others) {
+            let truth = match part.child_by_field_name("condition") {
+                Some(condition) => self.value(condition).truth(),
+                None => Some(true),
+            };
+            let body = part
+                .child_by_field_name("consequence")
+                .or(part.child_by_field_name("body"));
+            let Some(body) = body.filter(|_| truth != Some(false)) else {
+                continue;
+            };
+            sure &= truth.is_some();
+            self.undecided += usize::from(!sure);
+            flow = self.run(body);
+            self.undecided -= usize::from(!sure);
+            if truth == Some(true) {
+                break;
+            }
+        }
+        if sure { flow } else { ControlFlow::Next }
+    }
+
+    fn repeats(&mut self, node: Node<'a>) -> ControlFlow {
+        let fields = ["left", "right", "body"].map(|name| node.child_by_field_name(name));
+        let [Some(left), Some(right), Some(body)] = fields else {
+            return ControlFlow::Next;
+        };
+        for item in self.items(right) {
+            self.assign(left, item);
+            if self.run(body) == ControlFlow::Done {
+                return ControlFlow::Done;
+            }
+        }
+        ControlFlow::Next
+    }
+
+    /// The items of a loop, as far as known.
+    fn items(&mut self, node: Node<'a>) -> Vec<PythonValue> {
+        match self.value(node) {
+            List(list) => list,
+            Dict(map) => map.into_iter().map(|(key, _)| Text(key)).collect(),
+            _ => vec![unknown(node)],
+        }
+    }
+
+    /// An expression statement: an assignment, or a call that changes a list.
+    fn effect(&mut self, node: Node<'a>) {
+        let side = |name| node.child_by_field_name(name);
+        match (node.kind(), side("left"), side("right")) {
+            ("assignment", Some(left), Some(right)) => {
+                let value = self.value(right);
+                self.assign(left, value);
+            }
+            ("augmented_assignment", Some(left), Some(right)) => {
+                let (before, more) = (self.value(left), self.value(right));
+                let sum = self.sum(before, more, node);
+                self.assign(left, sum);
+            }
+            ("call", ..) => {
+                self.value(node);
+            }
+            _ => {}
+        }
+    }
+
+    fn assign(&mut self, target: Node<'a>, value: PythonValue) {
+        match (target.kind(), value) {
+            ("identifier", value) => {
+                let name = self.text(target).to_owned();
+                let sure = self
+                    .frames
+                    .last()
+                    .is_some_and(|f| f.undecided == self.undecided);
+                let value = if sure || value.acts() {
+                    value
+                } else {
+                    unknown(target)
+                };
+                if let Some(frame) = self.frames.last_mut() {
+                    frame.names.insert(name, value);
+                }
+            }
+            ("pattern_list" | "tuple_pattern", List(parts)) => {
+                for (target, part) in children(target).into_iter().zip(parts) {
+                    self.assign(target, part);
+                }
+            }
+            ("pattern_list" | "tuple_pattern", _) => {
+                for target in children(target) {
+                    self.assign(target, unknown(target));
+                }
+            }
+            ("subscript", value) => self.put(target, value),
+            _ => {}
+        }
+    }
+
+    /// `map['key'] = value`
+    fn put(&mut self, target: Node<'a>, value: PythonValue) {
+        let part = |name| target.child_by_field_name(name);
+        let (Some(map), Some(key)) = (part("value"), part("subscript")) else {
+            return;
+        };
+        let key = self.value(key).text();
+        if let (Some(Dict(entries)), Some(key)) = (self.variable(map), key) {
+            entries.retain(|(known, _)| *known != key);
+            entries.push((key, value));
+        }
+    }
+
+    /// The variable of a name, to be changed.
+    fn variable(&mut self, node: Node<'a>) -> Option<&mut PythonValue> {
+        let name = self.parsed.text(node);
+        let frames = self.frames.iter_mut().rev();
+        frames
+            .filter(|_| node.kind() == "identifier")
+            .find_map(|f| f.names.get_mut(name))
+    }
+
+    /// A copy of the value of a name.
+    fn named(&mut self, node: Node<'a>) -> PythonValue {
+        self.lookup(self.text(node), node)
+    }
+
+    /// A copy of the value of a name at `node`.
+    fn lookup(&mut self, name: &str, node: Node<'a>) -> PythonValue {
+        let found = self.frames.iter().rev().find_map(|f| f.names.get(name));
+        match found {
+            Some(value) => {
+                let value = value.clone();
+                self.kept(value, node)
+            }
+            None if self.functions.contains_key(name) => Function(name.to_owned()),
+            None if name == "true" => Bool(true),
+            None if name == "false" => Bool(false),
+            None => unknown(node),
+        }
+    }
+
+    /// A function of this file by its name.
+    fn function(&self, name: &str) -> Option<Node<'a>> {
+        self.functions.get(name).copied()
+    }
+
+    /// The return value of a function of this file.
+    fn call(
+        &mut self,
+        function: Node<'a>,
+        positional: &[PythonValue],
+        named: &[(String, PythonValue)],
+    ) -> PythonValue {
+        let parts = ["parameters", "body"].map(|name| function.child_by_field_name(name));
+        let [Some(parameters), Some(body)] = parts else {
+            return unknown(function);
+        };
+        if self.nested > NESTED {
+            return unknown(function);
+        }
+        let mut frame = Locals {
+            undecided: self.undecided,
+            ..Locals::default()
+        };
+        for (at, parameter) in children(parameters).into_iter().enumerate() {
+            let name = parameter
+                .child_by_field_name("name")
+                .or(match parameter.kind() {
+                    "identifier" => Some(parameter),
+                    _ => parameter.named_child(0),
+                });
+            let name = name.map_or("", |n| self.text(n)).to_owned();
+            let given = named.iter().find(|(n, _)| *n == name).map(|(_, v)| v);
+            let given = given.or(positional.get(at)).cloned();
+            let default = parameter.child_by_field_name("value");
+            let value = given.or_else(|| default.map(|d| self.value(d)));
+            frame
+                .names
+                .insert(name, value.unwrap_or(unknown(parameter)));
+        }
+        self.frames.push(frame);
+        self.nested += 1;
+        self.run(body);
+        self.nested -= 1;
+        let frame = self.frames.pop();
+        frame.and_then(|f| f.returned).unwrap_or(PythonValue::None)
+    }
+
+    /// The value of an expression.
+    fn value(&mut self, node: Node<'a>) -> PythonValue {
+        if self.nested > NESTED || self.budget.spend(STEP).is_none() {
+            return unknown(node);
+        }
+        self.nested += 1;
+        let value = self.expression(node);
+        self.nested -= 1;
+        value
+    }
+}
+
+// Expressions.
+
+impl<'a> Evaluator<'a> {
+    fn expression(&mut self, node: Node<'a>) -> PythonValue {
+        let unknown = Unknown(line(node));
+        let field = |name| node.child_by_field_name(name);
+        match node.kind() {
+            "string" | "concatenated_string" => self.string(node),
+            "integer" => self.text(node).parse().map_or(unknown, Number),
+            "float" => Text(self.text(node).to_owned()),
+            "true" => Bool(true),
+            "false" => Bool(false),
+            "none" => PythonValue::None,
+            "identifier" => self.constant(node),
+            "parenthesized_expression" | "await" => {
+                node.named_child(0).map_or(unknown, |n| self.value(n))
+            }
+            "list" | "tuple" | "set" | "expression_list" => self.list(node),
+            "dictionary" => self.dictionary(node),
+            "list_comprehension" | "generator_expression" => self.comprehension(node),
+            "binary_operator" => self.binary(node),
+            "boolean_operator" | "not_operator" | "comparison_operator" => self.logic(node),
+            "conditional_expression" => self.choice(node),
+            "subscript" => match (field("value"), field("subscript")) {
+                (Some(value), Some(key)) => self.subscript(value, key),
+                _ => unknown,
+            },
+            "attribute" => self.attribute(node),
+            "call" => self.call_expression(node),
+            _ => unknown,
+        }
+    }
+
+    fn constant(&mut self, node: Node<'a>) -> PythonValue {
+        match self.text(node) {
+            "__file__" => Text("$(dirname)/launch.py".to_owned()),
+            "__name__" => Text("launch".to_owned()),
+            _ => self.named(node),
+        }
+    }
+
+    fn string(&mut self, node: Node<'a>) -> PythonValue {
+        let mut text = String::new();
+        for part in children(node) {
+            match part.kind() {
+                "string_content" => text.push_str(self.text(part)),
+                "string" => text.push_str(&self.string(part).launch_text()),
+                "interpolation" => {
+                    let inner = part
+                        .child_by_field_name("expression")
+                        .or(part.named_child(0));
+                    let value = inner.map_or(PythonValue::None, |n| self.value(n));
+                    text.push_str(&value.launch_text());
+                }
+                _ => {}
+            }
+        }
+        self.kept(Text(text), node)
+    }
+
+    fn list(&mut self, node: Node<'a>) -> PythonValue {
+        let mut list = Vec::new();
+        for part in children(node) {
+            match (part.kind(), part.named_child(0)) {
+                ("list_splat", Some(inner)) => list.extend(self.items(inner)),
+                _ => list.push(self.value(part)),
+            }
+        }
+        self.kept(List(list), node)
+    }
+
+    fn dictionary(&mut self, node: Node<'a>) -> PythonValue {
+        let mut map: Vec<(String, PythonValue)> = Vec::new();
+        for pair in children(node) {
+            let parts = ["key", "value"].map(|name| pair.child_by_field_name(name));
+            if let [Some(key), Some(value)] = parts {
+                let (key, value) = (self.value(key), self.value(value));
+                map.push((key.launch_text(), value));
+            }
+        }
+        self.kept(Dict(map), node)
+    }
+
+    fn comprehension(&mut self, node: Node<'a>) -> PythonValue {
+        let parts = children(node);
+        let [body, clause, ..] = parts[..] else {
+            return unknown(node);
+        };
+        let sides = ["left", "right"].map(|name| clause.child_by_field_name(name));
+        let ([Some(left), Some(right)], 2) = (sides, parts.len()) else {
+            return unknown(node);
+        };
+        let mut list = Vec::new();
+        for item in self.items(right) {
+            self.assign(left, item);
+            list.push(self.value(body));
+        }
+        self.kept(List(list), node)
+    }
+
+    fn binary(&mut self, node: Node<'a>) -> PythonValue {
+        let fields = ["left", "operator", "right"].map(|name| node.child_by_field_name(name));
+        let [Some(left), Some(operator), Some(right)] = fields else {
+            return unknown(node);
+        };
+        let (left, right) = (self.value(left), self.value(right));
+        match self.text(operator) {
+            "+" => self.sum(left, right, node),
+            "%" => self.formatted(&left, &right, node),
+            // `Path(…) / 'x'`
+            "/" => self.kept(
+                Text(format!("{}/{}", left.launch_text(), right.launch_text())),
+                node,
+            ),
+            sign => match (sign, left, right) {
+                ("-", Number(a), Number(b)) => a.checked_sub(b).map_or(unknown(node), Number),
+                ("*", Number(a), Number(b)) => a.checked_mul(b).map_or(unknown(node), Number),
+                _ => unknown(node),
+            },
+        }
+    }
+
+    fn sum(&mut self, left: PythonValue, right: PythonValue, at: Node<'a>) -> PythonValue {
+        let sum = match (left, right) {
+            (Number(a), Number(b)) => a.checked_add(b).map_or(unknown(at), Number),
+            (List(mut a), List(b)) => {
+                a.extend(b);
+                List(a)
+            }
+            (List(mut a), unknown @ Unknown(_)) => {
+                a.push(unknown);
+                List(a)
+            }
+            (Text(a), b @ (Text(_) | Unknown(_))) => Text(a + &b.launch_text()),
+            (a @ Unknown(_), Text(b)) => Text(a.launch_text() + &b),
+            _ => unknown(at),
+        };
+        self.kept(sum, at)
+    }
+
+    /// `'%s_%d' % (a, b)`
+    fn formatted(
+        &mut self,
+        format: &PythonValue,
+        values: &PythonValue,
+        at: Node<'a>,
+    ) -> PythonValue {
+        let Text(format) = format else {
+            return unknown(at);
+        };
+        let one = std::slice::from_ref(values);
+        let mut values = match values {
+            List(list) => list.iter(),
+            _ => one.iter(),
+        };
+        let mut parts = format.split('%');
+        let mut text = parts.next().unwrap_or_default().to_owned();
+        for part in parts {
+            let value = values
+                .next()
+                .map_or_else(|| "$(unknown)".to_owned(), PythonValue::launch_text);
+            match part.strip_prefix(['s', 'd']) {
+                Some(rest) => text.extend([&value, rest]),
+                None => return unknown(at),
+            }
+        }
+        self.kept(Text(text), at)
+    }
+
+    fn logic(&mut self, node: Node<'a>) -> PythonValue {
+        let truth = match node.kind() {
+            "not_operator" => {
+                let inner = node.child_by_field_name("argument");
+                inner.and_then(|n| self.value(n).truth()).map(|t| !t)
+            }
+            "boolean_operator" => self.both(node),
+            _ => self.compared(node),
+        };
+        truth.map_or(unknown(node), Bool)
+    }
+
+    fn both(&mut self, node: Node<'a>) -> Option<bool> {
+        let side = |name| node.child_by_field_name(name);
+        let (left, right) = (
+            self.value(side("left")?).truth(),
+            self.value(side("right")?).truth(),
+        );
+        // The value of a left side for which the operator short-circuits.
+        let deciding = self.text(side("operator")?) == "or";
+        match (left, right) {
+            (Some(a), _) if a == deciding => Some(deciding),
+            (_, Some(b)) if b == deciding => Some(deciding),
+            (Some(_), Some(_)) => Some(!deciding),
+            _ => None,
+        }
+    }
+
+    fn compared(&mut self, node: Node<'a>) -> Option<bool> {
+        let sides = children(node);
+        let [left, right] = sides[..] else {
+            return None;
+        };
+        let operator = node.child_by_field_name("operators")?;
+        let operator = self.text(operator);
+        let (left, right) = (self.value(left), self.value(right));
+        match operator {
+            "==" | "is" => left.equals(&right),
+            "!=" | "is not" => left.equals(&right).map(|same| !same),
+            "in" => left.is_in(&right),
+            "not in" => left.is_in(&right).map(|inside| !inside),
+            sign => match (sign, left, right) {
+                ("<", Number(a), Number(b)) => Some(a < b),
+                (">", Number(a), Number(b)) => Some(a > b),
+                ("<=", Number(a), Number(b)) => Some(a <= b),
+                (">=", Number(a), Number(b)) => Some(a >= b),
+                _ => None,
+            },
+        }
+    }
+
+    /// `a if condition else b`
+    fn choice(&mut self, node: Node<'a>) -> PythonValue {
+        let parts = children(node);
+        let [yes, condition, no] = parts[..] else {
+            return unknown(node);
+        };
+        match self.value(condition).truth() {
+            Some(true) => self.value(yes),
+            Some(false) => self.value(no),
+            None => unknown(node),
+        }
+    }
+
+    fn subscript(&mut self, value: Node<'a>, key: Node<'a>) -> PythonValue {
+        if self.text(value) == "os.environ" {
+            return Text(format!("$(env {})", self.value(key).launch_text()));
+        }
+        let (found, key_value) = (self.value(value), self.value(key));
+        let part = match (&found, &key_value) {
+            (List(list), Number(at)) => usize::try_from(*at).ok().and_then(|at| list.get(at)),
+            (Dict(map), key) => {
+                let key = key.launch_text();
+                map.iter()
+                    .find(|(name, _)| *name == key)
+                    .map(|(_, value)| value)
+            }
+            _ => None,
+        };
+        part.cloned().unwrap_or(unknown(key))
+    }
+}
+
+impl PythonValue {
+    /// Whether it is an item of a list or a part of a text; `None` if unknown.
+    fn is_in(&self, all: &Self) -> Option<bool> {
+        match (self, all) {
+            (_, Self::List(list)) => {
+                let each: Option<Vec<bool>> = list.iter().map(|v| self.equals(v)).collect();
+                each.map(|each| each.contains(&true))
+            }
+            (Self::Text(part), Self::Text(text))
+                if !part.contains("$(") && !text.contains("$(") =>
+            {
+                Some(text.contains(part.as_str()))
+            }
+            _ => None,
+        }
+    }
+}
+
+// Calls.
+
+/// The arguments of a call, in order and by name.
+#[derive(Default)]
+struct Arguments {
+    positional: Vec<PythonValue>,
+    named: Vec<(String, PythonValue)>,
+    line: usize,
+}
+
+impl Arguments {
+    /// The argument of this name, or the one at position `place`.
+    fn get(&self, place: usize, name: &str) -> Option<&PythonValue> {
+        self.named(name).or(self.positional.get(place))
+    }
+
+    /// The argument of this name.
+    fn named(&self, name: &str) -> Option<&PythonValue> {
+        self.named
+            .iter()
+            .find(|(n, _)| n == name)
+            .map(|(_, value)| value)
+    }
+
+    /// An argument as a text of launch files.
+    fn text(&self, place: usize, name: &str) -> Option<String> {
+        self.get(place, name)
+            .filter(|v| **v != PythonValue::None)
+            .map(PythonValue::launch_text)
+    }
+}
+
+impl<'a> Evaluator<'a> {
+    fn call_expression(&mut self, node: Node<'a>) -> PythonValue {
+        let Some(function) = node.child_by_field_name("function") else {
+            return unknown(node);
+        };
+        let arguments = self.arguments(node);
+        if function.kind() == "attribute"
+            && let (Some(object), Some(name)) = (
+                function.child_by_field_name("object"),
+                function.child_by_field_name("attribute"),
+            )
+        {
+            let name = self.text(name);
+            if let Some(value) = self.method(object, name, &arguments) {
+                return self.kept(value, node);
+            }
+        }
+        let full = self.text(function);
+        let name = full.rsplit('.').next().unwrap_or(full);
+        if let ("arg", Some(Text(argument))) = (full, arguments.positional.first()) {
+            return self.lookup(argument, node);
+        }
+        if let Some(own) = self.function(name) {
+            return self.call(own, &arguments.positional, &arguments.named);
+        }
+        let value = self
+            .action(name, &arguments)
+            .or_else(|| substitution(name, &arguments))
+            .or_else(|| plain(full, &arguments))
+            .unwrap_or(unknown(node));
+        self.kept(value, node)
+    }
+
+    fn arguments(&mut self, call: Node<'a>) -> Arguments {
+        let mut arguments = Arguments {
+            line: line(call),
+            ..Arguments::default()
+        };
+        let Some(list) = call.child_by_field_name("arguments") else {
+            return arguments;
+        };
+        if list.kind() == "generator_expression" {
+            arguments.positional.push(self.value(list));
+            return arguments;
+        }
+        for argument in children(list) {
+            let part = |name| argument.child_by_field_name(name);
+            match (argument.kind(), part("name"), part("value")) {
+                ("keyword_argument", Some(name), Some(value)) => {
+                    let value = self.value(value);
+                    arguments.named.push((self.text(name).to_owned(), value));
+                }
+                ("dictionary_splat", ..) => {
+                    if let Some(Dict(map)) = argument.named_child(0).map(|n| self.value(n)) {
+                        arguments.named.extend(map);
+                    }
+                }
+                ("list_splat", ..) => {
+                    let items = argument.named_child(0).map(|n| self.items(n));
+                    arguments.positional.extend(items.unwrap_or_default());
+                }
+                _ => {
+                    let value = self.value(argument);
+                    arguments.positional.push(value);
+                }
+            }
+        }
+        arguments
+    }
+
+    /// A method of a known value: appends to lists, formats texts.
+    fn method(
+        &mut self,
+        object: Node<'a>,
+        name: &str,
+        arguments: &Arguments,
+    ) -> Option<PythonValue> {
+        let first = || arguments.positional.first().cloned();
+        match name {
+            "append" | "add_action" | "add_entity" => self.grow(object, vec![first()?]),
+            "insert" => self.grow(object, vec![arguments.positional.get(1)?.clone()]),
+            "extend" => match first()? {
+                List(list) => self.grow(object, list),
+                other => self.grow(object, vec![other]),
+            },
+            "items" => match self.value(object) {
+                Dict(map) => {
+                    let pair = |(key, value)| List(vec![Text(key), value]);
+                    Some(List(map.into_iter().map(pair).collect()))
+                }
+                _ => None,
+            },
+            // `LaunchConfiguration('x').perform(context)` is equivalent to `$(var x)`.
+            "perform" => Some(self.value(object)).filter(|value| value.text().is_some()),
+            "find" => {
+                let share = self.value(object).text()?;
+                share.starts_with("$(find-pkg-share").then_some(Text(share))
+            }
+            "format" => {
+                let text = self.value(object).text()?;
+                formatted(&text, arguments).map(Text)
+            }
+            "lower" => self
+                .value(object)
+                .text()
+                .filter(|t| !t.contains("$("))
+                .map(|t| Text(t.to_lowercase())),
+            "get" => {
+                if self.text(object) == "os.environ" {
+                    return plain("os.getenv", arguments);
+                }
+                match self.value(object) {
+                    Dict(map) => {
+                        let key = first()?.launch_text();
+                        let found = map
+                            .into_iter()
+                            .find(|(k, _)| *k == key)
+                            .map(|(_, value)| value);
+                        Some(
+                            found.unwrap_or(
+                                arguments
+                                    .positional
+                                    .get(1)
+                                    .cloned()
+                                    .unwrap_or(PythonValue::None),
+                            ),
+                        )
+                    }
+                    _ => None,
+                }
+            }
+            _ => None,
+        }
+    }
+
+    /// Adds to the list in a variable.
+    fn grow(&mut self, object: Node<'a>, more: Vec<PythonValue>) -> Option<PythonValue> {
+        let more = self.kept(List(more), object);
+        if let (List(list), List(more)) = (self.variable(object)?, more) {
+            list.extend(more);
+        }
+        Some(PythonValue::None)
+    }
+
+    /// The value of an attribute, such as `Path(…).parent`.
+    fn attribute(&mut self, node: Node<'a>) -> PythonValue {
+        let unknown = Unknown(line(node));
+        let Some(object) = node.child_by_field_name("object") else {
+            return unknown;
+        };
+        let name = node
+            .child_by_field_name("attribute")
+            .map_or("", |n| self.text(n));
+        match (name, self.value(object)) {
+            ("parent", Text(path)) => Text(parent(&path).to_owned()),
+            _ => unknown,
+        }
+    }
+}
+
+/// A launch substitution in its XML notation.
+fn substitution(name: &str, arguments: &Arguments) -> Option<PythonValue> {
+    let text = |place, name| arguments.text(place, name);
+    let made = match name {
+        "LaunchConfiguration" => match text(1, "default") {
+            Some(default) => format!("$(var {} {default})", text(0, "variable_name")?),
+            None => format!("$(var {})", text(0, "variable_name")?),
+        },
+        "TextSubstitution" => text(0, "text")?,
+        "FindPackageShare" | "get_package_share_directory" | "get_package_share_path" => {
+            format!("$(find-pkg-share {})", text(0, "package")?)
+        }
+        "FindPackagePrefix" | "FindPackage" | "get_package_prefix" => {
+            format!("$(find-pkg-prefix {})", text(0, "package")?)
+        }
+        "ThisLaunchFileDir" => "$(dirname)".to_owned(),
+        "EnvironmentVariable" | "getenv" => {
+            match text(1, "default_value").or_else(|| text(1, "default")) {
+                Some(default) => format!("$(env {} {default})", text(0, "name")?),
+                None => format!("$(env {})", text(0, "name")?),
+            }
+        }
+        "PathJoinSubstitution" | "PathJoin" => match arguments.get(0, "substitutions")? {
+            List(parts) => path(parts),
+            other => other.launch_text(),
+        },
+        "PythonExpression" => format!("$(eval {})", text(0, "expression")?),
+        "EqualsSubstitution" => {
+            format!("$(eval '{}' == '{}')", text(0, "left")?, text(1, "right")?)
+        }
+        "NotEqualsSubstitution" => {
+            format!("$(eval '{}' != '{}')", text(0, "left")?, text(1, "right")?)
+        }
+        "NotSubstitution" => format!("$(not {})", text(0, "value")?),
+        "AndSubstitution" => format!("$(and {} {})", text(0, "left")?, text(1, "right")?),
+        "OrSubstitution" => format!("$(or {} {})", text(0, "left")?, text(1, "right")?),
+        // Their path argument.
+        "PythonLaunchDescriptionSource"
+        | "AnyLaunchDescriptionSource"
+        | "XMLLaunchDescriptionSource"
+        | "YAMLLaunchDescriptionSource"
+        | "FrontendLaunchDescriptionSource" => text(0, "launch_file_path")?,
+        _ => return None,
+    };
+    Some(Text(made))
+}
+
+/// The result of a function of Python itself.
+fn plain(full: &str, arguments: &Arguments) -> Option<PythonValue> {
+    let first = arguments.positional.first();
+    let text = || first.map(PythonValue::launch_text);
+    match full {
+        "os.path.join" | "path.join" | "join" => Some(Text(path(&arguments.positional))),
+        "os.path.dirname" | "path.dirname" => Some(Text(parent(&text()?).to_owned())),
+        "os.path.abspath" | "os.path.realpath" | "os.path.normpath" | "Path" | "pathlib.Path"
+        | "str" => text().map(Text),
+        "os.getenv" | "os.environ.get" => substitution("getenv", arguments),
+        "list" | "tuple" => Some(first.cloned().unwrap_or(List(Vec::new()))),
+        "dict" => Some(Dict(arguments.named.clone())),
+        "range" => {
+            let number = |at: usize| match arguments.positional.get(at) {
+                Some(Number(number)) => Some(*number),
+                _ => None,
+            };
+            let (from, to) = match number(1) {
+                Some(to) => (number(0)?, to),
+                None => (0, number(0)?),
+            };
+            let is_small = to.checked_sub(from).is_some_and(|n| n <= 1000);
+            is_small.then(|| List((from..to).map(Number).collect()))
+        }
+        "len" => match first? {
+            List(list) => i64::try_from(list.len()).ok().map(Number),
+            _ => None,
+        },
+        "enumerate" => match first? {
+            List(list) => {
+                let pairs = (0..)
+                    .zip(list)
+                    .map(|(n, v)| List(vec![Number(n), v.clone()]));
+                Some(List(pairs.collect()))
+            }
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// Joins the parts of a path; a part that begins with a slash replaces those before it.
+fn path(parts: &[PythonValue]) -> String {
+    let mut joined = String::new();
+    for part in parts {
+        let part = part.launch_text();
+        if part.starts_with('/') {
+            joined.clear();
+        } else if !joined.is_empty() && !joined.ends_with('/') {
+            joined.push('/');
+        }
+        joined.push_str(&part);
+    }
+    joined
+}
+
+fn parent(path: &str) -> &str {
+    path.rsplit_once('/').map_or(".", |(folder, _)| folder)
+}
+
+/// `'{}_{name}'.format(a, name=b)`
+fn formatted(format: &str, arguments: &Arguments) -> Option<String> {
+    let mut next = 0;
+    let mut text = String::new();
+    let mut rest = format;
+    while let Some((before, after)) = rest.split_once('{') {
+        let (key, behind) = after.split_once('}')?;
+        let value = if key.is_empty() {
+            next += 1;
+            arguments.positional.get(next - 1)?
+        } else if let Ok(place) = key.parse::<usize>() {
+            arguments.positional.get(place)?
+        } else {
+            arguments.named(key)?
+        };
+        text.push_str(before);
+        text.push_str(&value.launch_text());
+        rest = behind;
+    }
+    Some(text + rest)
+}
+
+// Values.
+
+/// The value of an expression. Texts may contain launch substitutions `$(…)`.
+#[derive(Clone, PartialEq)]
+enum PythonValue {
+    /// A value that is only known at run time, with its line.
+    Unknown(usize),
+    None,
+    Bool(bool),
+    Number(i64),
+    Text(String),
+    List(Vec<Self>),
+    Dict(Vec<(String, Self)>),
+    /// A launch action, a condition, or a description of a node.
+    Action(Tree),
+    /// A function of this file.
+    Function(String),
+}
+
+/// The deepest nesting of values that is kept, which the stack must hold.
+const DEEPEST: usize = 48;
+
+impl PythonValue {
+    /// The text in launch notation: the parts of a list joined, an unknown part as `$(unknown)`.
+    fn launch_text(&self) -> String {
+        match self {
+            Self::List(parts) => parts.iter().map(Self::launch_text).collect(),
+            Self::None => String::new(),
+            other => other.text().unwrap_or_else(|| "$(unknown)".to_owned()),
+        }
+    }
+
+    /// The text as Python's `str` returns it; `None` if unknown.
+    fn text(&self) -> Option<String> {
+        match self {
+            Self::Text(text) => Some(text.clone()),
+            Self::Number(number) => Some(number.to_string()),
+            Self::Bool(true) => Some("True".to_owned()),
+            Self::Bool(false) => Some("False".to_owned()),
+            Self::None => Some("None".to_owned()),
+            _ => None,
+        }
+    }
+
+    /// Whether Python treats it as true; `None` if unknown.
+    fn truth(&self) -> Option<bool> {
+        match self {
+            Self::Bool(is_true) => Some(*is_true),
+            Self::None => Some(false),
+            Self::Number(number) => Some(*number != 0),
+            Self::Text(text) if text.contains("$(") => None,
+            Self::Text(text) => Some(!text.is_empty()),
+            Self::List(list) => Some(!list.is_empty()),
+            Self::Dict(map) => Some(!map.is_empty()),
+            Self::Unknown(_) | Self::Action(_) | Self::Function(_) => None,
+        }
+    }
+
+    /// Whether two values are equal; `None` if unknown. The text `true` equals `True`, as arguments are texts.
+    fn equals(&self, other: &Self) -> Option<bool> {
+        match (self, other) {
+            (Self::Text(a), Self::Text(b)) if a.contains("$(") || b.contains("$(") => None,
+            (Self::Text(text), Self::Bool(_)) => Some(text.eq_ignore_ascii_case(&other.text()?)),
+            (Self::Bool(_), Self::Text(text)) => Some(text.eq_ignore_ascii_case(&self.text()?)),
+            (Self::Text(text), Self::Number(number)) | (Self::Number(number), Self::Text(text)) => {
+                Some(*text == number.to_string())
+            }
+            (Self::Unknown(_) | Self::Action(_), _) | (_, Self::Unknown(_) | Self::Action(_)) => {
+                None
+            }
+            (a, b) => Some(a == b),
+        }
+    }
+
+    /// Whether it contains launch actions.
+    fn acts(&self) -> bool {
+        match self {
+            Self::Action(_) => true,
+            Self::List(list) => list.iter().any(Self::acts),
+            _ => false,
+        }
+    }
+
+    /// The size in bytes, approximately, and the depth of nesting.
+    fn measure(&self) -> (usize, usize) {
+        let all = |parts: &mut dyn Iterator<Item = (usize, usize)>| {
+            parts.fold((32, 1), |(size, depth), (s, d)| {
+                (size + s, depth.max(d + 1))
+            })
+        };
+        match self {
+            Self::Text(text) => (32 + text.len(), 1),
+            Self::List(list) => all(&mut list.iter().map(Self::measure)),
+            Self::Dict(map) => all(&mut map.iter().map(|(key, value)| {
+                let (size, depth) = value.measure();
+                (size + key.len(), depth)
+            })),
+            Self::Action(tree) => of_tree(tree),
+            _ => (32, 1),
+        }
+    }
+}
+
+fn of_tree(tree: &Tree) -> (usize, usize) {
+    let texts = tree.attributes.iter().map(|(a, b)| 48 + a.len() + b.len());
+    let own = 96 + texts.sum::<usize>();
+    tree.children
+        .iter()
+        .map(of_tree)
+        .fold((own, 1), |(size, depth), (s, d)| {
+            (size + s, depth.max(d + 1))
+        })
+}
+
+/// The value of an argument's text: `true` and `false` become Booleans.
+fn of_text(text: &str) -> PythonValue {
+    match text {
+        "true" | "True" => Bool(true),
+        "false" | "False" => Bool(false),
+        other => other
+            .parse()
+            .map_or_else(|_| Text(other.to_owned()), Number),
+    }
+}
+
+#[cfg(test)]
+mod tests;

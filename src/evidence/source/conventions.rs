@@ -1,0 +1,256 @@
+//! Conventions of ROS that complete what is known, without messages of their own: bonds, transforms, anonymous and private names,
+//! single publishers, dynamic reconfiguration.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use crate::base::role::start;
+use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
+use crate::evidence::observation::{Confidence, Name, SourceId};
+
+// Bonds: a node that publishes a bond topic (`bond/Status`) also subscribes to it.
+
+pub(crate) fn bond(source: SourceId, known: &mut Conclusions<'_>) {
+    for topic in known.topics_of(|kind| kind == "bond/Status") {
+        for node in known.publishers(topic).collect::<Vec<_>>() {
+            known.subscribes_as_well(source, node, topic, topic);
+        }
+    }
+}
+
+// A subscriber of `/tf` also subscribes to `/tf_static`, and vice versa: tf2 always subscribes to both.
+
+const PAIR: [&str; 2] = ["tf", "tf_static"];
+
+pub(crate) fn tf_pair(source: SourceId, known: &mut Conclusions<'_>) {
+    let listened: Vec<(Name, Name)> = known.subscriptions().collect();
+    for (topic, node) in listened {
+        let text = known.text(topic);
+        let Some((space, last)) = text.rsplit_once('/') else {
+            continue;
+        };
+        let Some(at) = PAIR.iter().position(|name| *name == last) else {
+            continue;
+        };
+        let twin = known.facts.known(&format!("{space}/{}", PAIR[1 - at]));
+        if let Some(twin) = twin.filter(|t| known.kind(*t) == "tf2_msgs/TFMessage") {
+            let basis = ElementKey::Subscribe(topic, node);
+            known.infer(source, ElementKey::Subscribe(twin, node), basis, |known| {
+                format!(
+                    "{} subscribes to {text}, and tf2 always subscribes to both",
+                    known.text(node)
+                )
+            });
+        }
+    }
+}
+
+// The start time inside an anonymous name: rospy appends its process and the milliseconds since 1970, roscpp the
+// nanoseconds.
+
+/// The longest time from a start in a name to the recording, in nanoseconds; if it is longer, the clock was
+/// not set.
+const LONGEST_NS: i64 = 30 * 86_400_000_000_000;
+
+pub(crate) fn anonymous(source: SourceId, known: &mut Conclusions<'_>) {
+    let (first, last) = known.mission;
+    for node in known.nodes().clone() {
+        let Some(start) = start(&known.text(node)) else {
+            continue;
+        };
+        if known.gone.contains(&Some(node)) || start > last || first.since(start) > LONGEST_NS {
+            continue;
+        }
+        let what = ElementKey::Node(node);
+        let when = Validity::Begins {
+            signs: vec![start.max(first)],
+            ends: Vec::new(),
+        };
+        let inference = Inference::new(source, what, Confidence::Stated, when);
+        known.because(inference, Some(start), |known| {
+            format!("the name {} contains this start time", known.text(node))
+        });
+    }
+}
+
+// The publisher of a topic with messages that name none: if only one node is known to publish it, the messages are from
+// that node. For example, if only `/gps` is known to publish `/fix` from its log, it sent all messages of `/fix`.
+
+/// Topics that any node may publish, so that one known publisher does not imply that it is the only one.
+const SHARED: [&str; 8] = [
+    "/tf",
+    "/tf_static",
+    "/rosout",
+    "/rosout_agg",
+    "/diagnostics",
+    "/parameter_events",
+    "/statistics",
+    "/clock",
+];
+
+pub(crate) fn only_publisher(source: SourceId, known: &mut Conclusions<'_>) {
+    for (at, stream) in known.streams.iter().enumerate() {
+        if stream.publisher.is_some() || SHARED.contains(&stream.connection.topic.as_str()) {
+            continue;
+        }
+        if let Some(only) = known.only_publisher(stream.topic) {
+            let what = ElementKey::Publish(only, stream.topic);
+            let when = Validity::Messages(at);
+            known.add(Inference::new(source, what, Confidence::Inferred, when));
+        }
+    }
+}
+
+// `dynamic_reconfigure` of ROS 1: `<node>/parameter_descriptions` and `<node>/parameter_updates` belong to
+// one node. A caller of another name, unless the topic is below it, runs that node as a nodelet.
+
+const TOPICS: [&str; 2] = ["/parameter_descriptions", "/parameter_updates"];
+
+pub(crate) fn dynamic_reconfigure(source: SourceId, known: &mut Conclusions<'_>) {
+    let is_config = |kind: &str| {
+        matches!(
+            kind,
+            "dynamic_reconfigure/ConfigDescription" | "dynamic_reconfigure/Config"
+        )
+    };
+    for topic in known.topics_of(is_config) {
+        let text = known.text(topic);
+        let Some(node) = TOPICS.iter().find_map(|end| text.strip_suffix(end)) else {
+            continue;
+        };
+        let pair = TOPICS.map(|end| known.facts.name(&format!("{node}{end}")));
+        let callers: Vec<_> = known.publishers(topic).collect();
+        for caller in &callers {
+            for other in pair.iter().filter(|t| **t != topic) {
+                let basis = ElementKey::Publish(*caller, topic);
+                known.like(source, ElementKey::Publish(*caller, *other), basis);
+            }
+            if is_nodelet(&known.text(*caller), node) {
+                let node = known.facts.name(node);
+                known.like(source, ElementKey::Node(node), ElementKey::Node(*caller));
+            }
+        }
+        if callers.is_empty() {
+            let node = known.facts.name(node);
+            own_config(source, known, node, topic);
+        }
+    }
+}
+
+/// Whether a topic of `node` that `caller` publishes shows a nodelet, not a part of the caller.
+fn is_nodelet(caller: &str, node: &str) -> bool {
+    caller != node && !node.starts_with(&format!("{caller}/"))
+}
+
+/// Adds the publication of a node whose topic has no known publisher.
+fn own_config(source: SourceId, known: &mut Conclusions<'_>, node: Name, topic: Name) {
+    for (at, stream) in known.streams.iter().enumerate() {
+        if stream.topic == topic {
+            let what = ElementKey::Publish(node, topic);
+            let when = Validity::Messages(at);
+            known.add(Inference::new(source, what, Confidence::Inferred, when));
+        }
+    }
+}
+
+// Private names: a topic below a node's own full name belongs to the node, so it publishes it if no other
+// publisher is known. For example, `/move_base/status` is by `/move_base`.
+
+/// Beginnings of the last part of names that others publish: goals for an action, commands for a controller.
+const TAKEN: [&str; 16] = [
+    "goal",
+    "cancel",
+    "cmd",
+    "command",
+    "set",
+    "input",
+    "target",
+    "desired",
+    "reference",
+    "request",
+    "trigger",
+    "enable",
+    "disable",
+    "reset",
+    "joint_trajectory",
+    "sub_",
+];
+
+pub(crate) fn private_name(source: SourceId, known: &mut Conclusions<'_>) {
+    let nodes: NodesByName = known.nodes().iter().map(|n| (known.text(*n), *n)).collect();
+    let spaces = spaces(&nodes);
+    for topic in known.topics_of(|_| true) {
+        let name = known.text(topic);
+        let last = name.rsplit('/').next().unwrap_or_default();
+        let is_taken = TAKEN.iter().any(|taken| last.starts_with(taken));
+        if known.publishers(topic).next().is_some() || is_taken || is_hidden(&name) {
+            continue;
+        }
+        if let Some(node) = owner(&name, &nodes, &spaces) {
+            known.infer_publisher(source, node, topic, |known| {
+                format!(
+                    "{} is below the name of {}",
+                    known.text(topic),
+                    known.text(node)
+                )
+            });
+        }
+    }
+}
+
+/// Whether a part of a name is hidden, as those of actions and of service introspection are.
+fn is_hidden(topic: &str) -> bool {
+    topic.split('/').any(|part| part.starts_with('_'))
+}
+
+/// Nodes by name.
+type NodesByName = BTreeMap<Arc<str>, Name>;
+
+/// The names that are namespaces of other nodes.
+fn spaces(nodes: &NodesByName) -> BTreeSet<&str> {
+    nodes.keys().flat_map(|node| above(node)).collect()
+}
+
+/// The namespaces of a name, the nearest first, without the root.
+fn above(name: &str) -> impl Iterator<Item = &str> {
+    let slashes = name.rmatch_indices('/');
+    slashes
+        .map(|(at, _)| &name[..at])
+        .filter(|space| !space.is_empty())
+}
+
+/// The node with the longest name above a topic, unless that name is also a namespace of other nodes.
+fn owner(topic: &str, nodes: &NodesByName, spaces: &BTreeSet<&str>) -> Option<Name> {
+    let name = above(topic).find(|name| nodes.contains_key(*name))?;
+    nodes.get(name).copied().filter(|_| !spaces.contains(name))
+}
+
+#[cfg(test)]
+mod tests {
+    mod dynamic_reconfigure {
+        use super::super::*;
+
+        #[test]
+        fn a_nodelet_is_not_part_of_its_caller() {
+            assert!(is_nodelet("/mgr", "/decim"));
+            assert!(!is_nodelet("/move_base", "/move_base"));
+            assert!(!is_nodelet("/move_base", "/move_base/costmap"));
+        }
+    }
+
+    mod private_name {
+        use super::super::*;
+
+        #[test]
+        fn a_topic_in_a_private_namespace_belongs_to_its_node() {
+            let names = ["/amcl", "/r1", "/r1/nav"].into_iter().map(Arc::from);
+            let nodes: NodesByName = names.zip((0..).map(Name)).collect();
+            let owner = |topic| owner(topic, &nodes, &spaces(&nodes));
+            assert_eq!(owner("/amcl/pose"), Some(Name(0)));
+            assert_eq!(owner("/r1/nav/plan"), Some(Name(2)));
+            assert_eq!(owner("/r1/scan"), None);
+            assert_eq!(owner("/amcl_pose"), None);
+            assert_eq!(owner("/amcl"), None);
+        }
+    }
+}

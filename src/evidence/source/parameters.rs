@@ -1,0 +1,194 @@
+//! Parameter events of ROS 2 (`rcl_interfaces/msg/ParameterEvent`): parameters of a node that were declared or set.
+
+use std::collections::BTreeSet;
+
+use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
+use crate::evidence::message::dynamic::MessageLayout;
+use crate::evidence::observation::{Confidence, Observation};
+use crate::evidence::source::SourceContext;
+
+/// `rcl_interfaces/msg/ParameterEvent`.
+pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2(
+    "rcl_interfaces/ParameterEvent",
+    &[
+        (
+            "",
+            "time stamp;string node;Parameter[] new_parameters;Parameter[] changed_parameters;Parameter[] deleted_parameters",
+        ),
+        ("Parameter", "string name;ParameterValue value"),
+        (
+            "ParameterValue",
+            "byte type;byte bool_value;int64 integer_value;float64 double_value;string string_value;byte[] byte_array_value;\
+             byte[] bool_array_value;int64[] integer_array_value;float64[] double_array_value;string[] string_array_value",
+        ),
+    ],
+);
+
+/// A parameter that was declared or set.
+#[derive(Clone, Copy)]
+pub(crate) struct Parameter<'a> {
+    pub(crate) name: &'a str,
+    /// The value, if Boolean.
+    pub(crate) truth: Option<bool>,
+}
+
+/// A change of a node's parameters.
+pub(crate) struct ParameterEvent<'a> {
+    /// The node's full name; empty if not stated.
+    pub(crate) node: &'a str,
+    /// The new and the changed parameters.
+    pub(crate) set: Vec<Parameter<'a>>,
+    /// Whether `use_sim_time` is new, which every node declares when it starts.
+    pub(crate) is_start: bool,
+}
+
+impl<'a> ParameterEvent<'a> {
+    /// Reads a whole event.
+    ///
+    /// # Errors
+    /// If the payload has another layout.
+    pub(crate) fn read(payload: &mut PayloadCursor<'a>) -> PayloadResult<Self> {
+        payload.time()?;
+        let node = payload.string()?;
+        let mut set = Vec::new();
+        let mut is_start = false;
+        for list in 0..3 {
+            for _ in 0..payload.length(4)? {
+                let parameter = parameter(payload)?;
+                is_start |= list == 0 && parameter.name == "use_sim_time";
+                // The third list contains deleted parameters.
+                set.extend((list < 2).then_some(parameter));
+            }
+        }
+        payload.finish()?;
+        Ok(Self {
+            node,
+            set,
+            is_start,
+        })
+    }
+}
+
+/// The value of `PARAMETER_BOOL` in `rcl_interfaces/msg/ParameterType`.
+const BOOL: u8 = 1;
+
+fn parameter<'a>(payload: &mut PayloadCursor<'a>) -> PayloadResult<Parameter<'a>> {
+    let name = payload.string()?;
+    let (kind, truth) = (payload.u8()?, payload.u8()?);
+    payload.i64()?;
+    payload.f64()?;
+    payload.skip_string()?;
+    for least in [1, 1] {
+        let count = payload.length(least)?;
+        payload.bytes(count)?;
+    }
+    for _ in 0..2 {
+        for _ in 0..payload.length(8)? {
+            payload.u64()?;
+        }
+    }
+    for _ in 0..payload.length(4)? {
+        payload.skip_string()?;
+    }
+    Ok(Parameter {
+        name,
+        truth: (kind == BOOL).then_some(truth != 0),
+    })
+}
+
+// A node is running.
+
+pub(crate) fn read_node(context: &mut SourceContext<'_>, event: &ParameterEvent<'_>) {
+    let name = event.node;
+    if name.is_empty() {
+        return;
+    }
+    let (node, topic) = (context.name(name), context.stream.topic);
+    if event.is_start {
+        let begins = || format!("{name} declares `use_sim_time`, as it starts");
+        context.states(Observation::Begins(node), begins);
+    }
+    let reports = || format!("{name} reports its parameters");
+    context.states(Observation::Node(node), reports);
+    context.states(Observation::Publish(node, topic), reports);
+}
+
+// `qos_overrides.<topic>.publisher|subscription.<policy>`: rclcpp declares these parameters when it creates that
+// publisher or subscription.
+
+pub(crate) fn read_overrides(context: &mut SourceContext<'_>, event: &ParameterEvent<'_>) {
+    let ends: BTreeSet<_> = event.set.iter().filter_map(|p| end_of(p.name)).collect();
+    for (topic, publishes) in ends {
+        let (node, of) = (context.name(event.node), context.name(topic));
+        let (word, observation) = if publishes {
+            ("publisher", Observation::Publish(node, of))
+        } else {
+            ("subscription", Observation::Subscribe(node, of))
+        };
+        context.states(observation, || {
+            format!("{} declares qos_overrides.{topic}.{word}", event.node)
+        });
+    }
+}
+
+/// The topic in the name of a parameter, and whether a publisher is meant. An entity may have its own id
+/// (`publisher_front`).
+fn end_of(parameter: &str) -> Option<(&str, bool)> {
+    let rest = parameter.strip_prefix("qos_overrides.")?;
+    let (entity, _policy) = rest.rsplit_once('.')?;
+    let (topic, entity) = entity.rsplit_once('.')?;
+    let kind = entity.split('_').next()?;
+    let publishes = match kind {
+        "publisher" => true,
+        "subscription" => false,
+        _ => return None,
+    };
+    topic.starts_with('/').then_some((topic, publishes))
+}
+
+// `use_sim_time`: a node that runs by simulated time subscribes to `/clock`.
+
+pub(crate) fn read_sim_time(context: &mut SourceContext<'_>, event: &ParameterEvent<'_>) {
+    let set = event.set.iter().rev().find(|p| p.name == "use_sim_time");
+    let Some(simulated) = set.and_then(|p| p.truth).filter(|_| !event.node.is_empty()) else {
+        return;
+    };
+    let (node, clock) = (context.name(event.node), context.name("/clock"));
+    let observation = if simulated {
+        Observation::Subscribe(node, clock)
+    } else {
+        Observation::Unsubscribe(node, clock)
+    };
+    context.observation(observation, Confidence::Inferred, || {
+        let then = if simulated {
+            ""
+        } else {
+            ", so it does not subscribe to /clock"
+        };
+        format!("{} sets use_sim_time to {simulated}{then}", event.node)
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parameter_names_its_topic_and_end() {
+        assert_eq!(
+            end_of("qos_overrides./tf.publisher.depth"),
+            Some(("/tf", true))
+        );
+        assert_eq!(
+            end_of("qos_overrides./a/scan.subscription_left.history"),
+            Some(("/a/scan", false))
+        );
+        for other in [
+            "use_sim_time",
+            "qos_overrides./tf.depth",
+            "qos_overrides.tf.x.y",
+        ] {
+            assert_eq!(end_of(other), None);
+        }
+    }
+}

@@ -1,0 +1,450 @@
+//! The messages of every sender on every topic over the whole mission: even stretches, pauses, first and last
+//! messages.
+
+use std::io;
+
+use crate::base::error::Result;
+use crate::base::name::is_feedback;
+use crate::base::rhythm::{EVEN, FEWEST_INTERVALS, GAP, GAP_NS, SAME_RATE};
+use crate::base::time::{Span, Stamp};
+use crate::evidence::collector::{Recorded, spool_error};
+use crate::evidence::conclude::Findings;
+use crate::evidence::inference::{Reliability, Stream};
+use crate::evidence::observation::Name;
+use crate::graph::ById;
+use crate::graph::history::recordings::recordings;
+use crate::graph::history::{LongestPauses, Stretch};
+
+/// The senders of each topic.
+pub(crate) type Traffic = ById<Name, Senders>;
+
+/// The senders of one topic; empty for other names.
+pub(crate) struct Senders {
+    /// The indices of the topic's streams, sorted.
+    pub(crate) streams: Vec<usize>,
+    /// The first and the last message of each stream; `None` without messages.
+    pub(crate) traces: Vec<Option<(Stamp, Stamp)>>,
+    /// The messages of each sender: first the unknown ones together, then the known ones, sorted.
+    pub(crate) list: Vec<Sender>,
+    /// The index of each stream's sender in `list`.
+    pub(crate) of: Vec<usize>,
+    /// The longest pauses of all senders together.
+    pub(crate) pauses: Vec<Span>,
+}
+
+impl Senders {
+    /// The place of a stream among those of the topic; there is one per file of a split recording.
+    pub(crate) fn place(&self, stream: usize) -> Option<usize> {
+        self.streams.binary_search(&stream).ok()
+    }
+}
+
+/// The messages of one sender on one topic, over all its streams: a split recording has one per part.
+pub(crate) struct Sender {
+    /// The node; `None` for all unknown senders together.
+    pub(crate) node: Option<Name>,
+    pub(crate) latched: bool,
+    pub(crate) stretches: Vec<Stretch>,
+    /// The first and the last moment of its recordings.
+    pub(crate) recording: (Stamp, Stamp),
+}
+
+/// The node that sent the messages of a stream, if its name is reliable enough.
+pub(crate) fn sender(stream: &Stream) -> Option<Name> {
+    stream
+        .publisher
+        .filter(|_| !matches!(stream.trust, Reliability::First | Reliability::Gone))
+}
+
+/// Reads the times of every topic once.
+pub(crate) fn traffic(recorded: &Recorded, findings: &Findings) -> Result<Traffic> {
+    let recordings = recordings(recorded, &findings.streams);
+    let mut streams: ById<Name, Vec<usize>> = ById::default();
+    for (at, stream) in findings.streams.iter().enumerate() {
+        streams.grown(stream.topic).push(at);
+    }
+    let of_topic = |of| senders(recorded, findings, &recordings, of);
+    let all: io::Result<Traffic> = streams.into_iter().map(of_topic).collect();
+    all.map_err(spool_error)
+}
+
+/// Reads the times of some streams, which together are one topic.
+fn senders(
+    recorded: &Recorded,
+    findings: &Findings,
+    recordings: &[Option<(Stamp, Stamp)>],
+    streams: Vec<usize>,
+) -> io::Result<Senders> {
+    let of_topic: Vec<&Stream> = streams.iter().map(|at| &findings.streams[*at]).collect();
+    let ids: Vec<_> = of_topic.iter().map(|stream| stream.times).collect();
+    let mut traces: Vec<Option<(Stamp, Stamp)>> = vec![None; streams.len()];
+    let (of, mut received) = places(&of_topic, recordings);
+    let mut pauses = LongestPauses::default();
+    recorded.messages.merge(&ids, |timed| {
+        let trace = &mut traces[timed.series];
+        *trace = Some((trace.map_or(timed.time, |t| t.0), timed.time));
+        pauses.add(timed.time);
+        received[of[timed.series]].add(timed.time);
+    })?;
+    let mut list: Vec<Sender> = received.into_iter().map(SenderTimes::into_sender).collect();
+    let topic = of_topic.first().map(|stream| &stream.connection.topic);
+    if topic.is_some_and(|topic| is_feedback(topic.as_str())) {
+        let stretches = list.iter_mut().flat_map(|sender| &mut sender.stretches);
+        stretches.for_each(|stretch| stretch.is_even = false);
+    }
+    Ok(Senders {
+        streams,
+        traces,
+        list,
+        of,
+        pauses: pauses.spans(),
+    })
+}
+
+/// The times of one sender.
+struct SenderTimes {
+    node: Option<Name>,
+    latched: bool,
+    times: Vec<Stamp>,
+    recording: (Stamp, Stamp),
+    /// One of this many messages is kept, and every late one.
+    every: usize,
+    passed: usize,
+}
+
+/// The most times kept per sender (32 MB); of more, every second one is dropped.
+const MOST_TIMES: usize = 1 << 22;
+/// The silence after which a message is kept in any case, and the one before it, in nanoseconds: half of the shortest gap, so
+/// that no gap is lost.
+const LATE_NS: i64 = 500_000_000;
+
+impl SenderTimes {
+    fn add(&mut self, time: Stamp) {
+        let late = self
+            .times
+            .last()
+            .is_none_or(|last| time.since(*last) > LATE_NS);
+        self.passed += 1;
+        if !late && self.passed < self.every {
+            return;
+        }
+        self.passed = 0;
+        self.times.push(time);
+        if self.times.len() > MOST_TIMES {
+            self.every *= 2;
+            let mut kept = false;
+            self.times.retain(|_| {
+                kept = !kept;
+                kept
+            });
+        }
+    }
+
+    fn into_sender(self) -> Sender {
+        let mut stretches = stretches(&self.times);
+        for stretch in &mut stretches {
+            stretch.count = (stretch.count - 1) * self.every as u64 + 1;
+            stretch.period /= i64::try_from(self.every).unwrap_or(i64::MAX);
+        }
+        Sender {
+            node: self.node,
+            latched: self.latched,
+            stretches,
+            recording: self.recording,
+        }
+    }
+}
+
+/// The index of each stream's sender, and the senders without times yet.
+fn places(
+    streams: &[&Stream],
+    recordings: &[Option<(Stamp, Stamp)>],
+) -> (Vec<usize>, Vec<SenderTimes>) {
+    let mut nodes: Vec<Option<Name>> = streams.iter().map(|stream| sender(stream)).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    let place = |stream: &&Stream| nodes.binary_search(&sender(stream)).unwrap_or(0);
+    let received = nodes.iter().map(|node| {
+        let own = || streams.iter().filter(|stream| sender(stream) == *node);
+        let reached = own().filter_map(|stream| recordings[stream.bag]);
+        let reached = reached.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        SenderTimes {
+            node: *node,
+            latched: own().all(|stream| stream.latched),
+            recording: reached.unwrap_or((Stamp::MIN, Stamp::MAX)),
+            times: Vec::new(),
+            every: 1,
+            passed: 0,
+        }
+    });
+    (streams.iter().map(place).collect(), received.collect())
+}
+
+// Stretches of even messages, from the times of one sender: gaps and rate changes end them.
+
+/// The number of intervals on each side of a gap from which the usual one is taken: enough for a median that a lost message
+/// does not change, few enough to follow a changing rate.
+const AROUND: usize = 9;
+/// The most pieces of a run that are searched for rate changes; intervals of longer runs are summed first, so that the search
+/// takes the same time for an hour as for a minute.
+const PIECES: usize = 2048;
+/// The depth of splitting one sender's messages by rate; each level may double the number of rates, so that there are at most
+/// 256.
+const DEPTH: usize = 8;
+/// The least gain in log likelihood of a rate change over chance: 3 standard deviations of a normal
+/// distribution are 3²/2 in log likelihood, doubled because of the many possible positions.
+const GAIN: f64 = 9.0;
+/// The most gaps of a sender with a rhythm; after more, the rest of its messages is one stretch.
+const MOST_GAPS: usize = 4096;
+
+/// Divides sorted times into stretches of even messages.
+pub(crate) fn stretches(times: &[Stamp]) -> Vec<Stretch> {
+    let mut all = Vec::new();
+    let mut from = 0;
+    for to in gaps(times) {
+        split(&times[from..to], DEPTH, false, &mut all);
+        from = to;
+    }
+    if from < times.len() {
+        split(&times[from..], DEPTH, false, &mut all);
+    }
+    merged(all, times)
+}
+
+/// The indices of the first messages after gaps.
+fn gaps(times: &[Stamp]) -> Vec<usize> {
+    let mut found = Vec::new();
+    for at in 1..times.len() {
+        let long = times[at].since(times[at - 1]);
+        if long <= GAP_NS || found.len() >= MOST_GAPS {
+            continue;
+        }
+        let before = usual(&times[at.saturating_sub(AROUND + 1)..at]);
+        let after = usual(&times[at..times.len().min(at + AROUND + 1)]);
+        let longest = match (before, after) {
+            (Some(a), Some(b)) => Some(a.max(b)),
+            (a, b) => a.or(b),
+        };
+        if longest.is_some_and(|usual| long > usual.saturating_mul(GAP)) {
+            found.push(at);
+        }
+    }
+    found
+}
+
+/// The lower median of a few intervals.
+fn usual(times: &[Stamp]) -> Option<i64> {
+    let mut intervals: Vec<i64> = times.windows(2).map(|t| t[1].since(t[0])).collect();
+    intervals.sort_unstable();
+    intervals.get(intervals.len().checked_sub(1)? / 2).copied()
+}
+
+/// Splits a run without gaps where its rate changes most, as long as the change is significant.
+fn split(times: &[Stamp], depth: usize, is_joined: bool, all: &mut Vec<Stretch>) {
+    let Some(cut) = (depth > 0).then(|| cut(times)).flatten() else {
+        all.extend(stretch(times, is_joined));
+        return;
+    };
+    split(&times[..=cut], depth - 1, is_joined, all);
+    split(&times[cut..], depth - 1, true, all);
+}
+
+/// The message at which the rate changes most; `None` if it does not.
+fn cut(times: &[Stamp]) -> Option<usize> {
+    let intervals = times.len().checked_sub(1)?;
+    if intervals < 2 * FEWEST_INTERVALS {
+        return None;
+    }
+    let step = intervals.div_ceil(PIECES);
+    let coarse = best(
+        times,
+        step,
+        FEWEST_INTERVALS.div_ceil(step) * step..=intervals,
+    )?;
+    if step == 1 {
+        return Some(coarse);
+    }
+    let (from, to) = (
+        coarse.saturating_sub(step),
+        (coarse + step).min(intervals - FEWEST_INTERVALS),
+    );
+    // The exact position near the coarse one: where the sum of both sides' deviations is smallest.
+    best(times, 1, from.max(FEWEST_INTERVALS)..=to).or(Some(coarse))
+}
+
+/// The best position in `range`, every `step` messages, by the likelihood of intervals with one mean on each
+/// side, in units of the intervals' scatter.
+fn best(times: &[Stamp], step: usize, range: std::ops::RangeInclusive<usize>) -> Option<usize> {
+    let n = times.len() - 1;
+    let whole = times[n].since(times[0]) as f64;
+    let scatter = scatter(times, step);
+    let cost = |count: f64, nanos: f64| count * libm::log(nanos.max(1.0) / count);
+    let unsplit = cost(n as f64, whole);
+    let (mut found, mut most) = (None, GAIN * scatter);
+    for at in range.step_by(step) {
+        if at < FEWEST_INTERVALS || n - at < FEWEST_INTERVALS {
+            continue;
+        }
+        let left = times[at].since(times[0]) as f64;
+        let gain = unsplit - cost(at as f64, left) - cost((n - at) as f64, whole - left);
+        if gain > most {
+            (found, most) = (Some(at), gain);
+        }
+    }
+    found
+}
+
+/// The squared variation of neighbouring intervals (of sums of `step` of them), per interval; of random arrivals 1.
+fn scatter(times: &[Stamp], step: usize) -> f64 {
+    let sums: Vec<f64> = times
+        .iter()
+        .step_by(step)
+        .zip(times.iter().step_by(step).skip(1))
+        .map(|(a, b)| b.since(*a) as f64)
+        .collect();
+    let mut ratios: Vec<f64> = sums
+        .windows(2)
+        .map(|p| libm::fabs(p[1] - p[0]) / (p[0] + p[1]).max(1.0))
+        .collect();
+    if ratios.is_empty() {
+        return 1.0;
+    }
+    // The upper quartile: where one message in three is lost, half of the neighbours are still equal.
+    let place = ratios.len() * 3 / 4;
+    let (_, upper, _) = ratios.select_nth_unstable_by(place, f64::total_cmp);
+    // For random arrivals it is 3/4; sums of `step` intervals scatter less in the same proportion.
+    let relative = *upper * 4.0 / 3.0;
+    (relative * relative * step as f64).clamp(0.01, 4.0)
+}
+
+/// The stretch of a run of messages at one rate.
+fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
+    let (first, last) = (*times.first()?, *times.last()?);
+    let mut intervals: Vec<i64> = times.windows(2).map(|t| t[1].since(t[0])).collect();
+    let n = intervals.len();
+    let mut quantile = |part: usize| {
+        if n == 0 {
+            return 0;
+        }
+        *intervals.select_nth_unstable((n * part / 4).min(n - 1)).1
+    };
+    let (lower, period, upper) = (quantile(1), quantile(2), quantile(3));
+    Some(Stretch {
+        first,
+        last,
+        count: times.len() as u64,
+        period,
+        is_even: n >= FEWEST_INTERVALS && upper as f64 <= EVEN * lower.max(1) as f64,
+        is_joined,
+    })
+}
+
+/// Joins neighbours whose rates have the same median.
+fn merged(all: Vec<Stretch>, times: &[Stamp]) -> Vec<Stretch> {
+    let mut kept: Vec<Stretch> = Vec::new();
+    for next in all {
+        match kept.last_mut() {
+            Some(last) if next.is_joined && is_same(last, &next) => {
+                let from = times.partition_point(|t| *t < last.first);
+                let to = times.partition_point(|t| *t <= next.last);
+                if let Some(both) = stretch(&times[from..to], last.is_joined) {
+                    *last = both;
+                }
+            }
+            _ => kept.push(next),
+        }
+    }
+    kept
+}
+
+fn is_same(a: &Stretch, b: &Stretch) -> bool {
+    let ratio = a.period.max(1) as f64 / b.period.max(1) as f64;
+    (1.0 / SAME_RATE..=SAME_RATE).contains(&ratio)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Times from runs of (number, milliseconds apart), with a little jitter.
+    fn times(runs: &[(usize, i64)]) -> Vec<Stamp> {
+        let (mut at, mut all) = (0, vec![Stamp(0)]);
+        let mut noise = 7_i64;
+        for (many, apart) in runs {
+            for _ in 0..*many {
+                noise = (noise * 48_271) % 2_147_483_647;
+                at += apart * 1_000_000 + apart * 1_000_000 / 50 * (noise % 7 - 3);
+                all.push(Stamp(at));
+            }
+        }
+        all
+    }
+
+    fn reported(runs: &[(usize, i64)]) -> Vec<(u64, i64, bool)> {
+        let all = stretches(&times(runs));
+        all.iter()
+            .map(|s| (s.count, s.period / 1_000_000, s.is_joined))
+            .collect()
+    }
+
+    #[test]
+    fn a_steady_sender_sends_one_stretch() {
+        assert_eq!(reported(&[(300, 100)]).len(), 1);
+        assert_eq!(reported(&[(100_000, 10)]).len(), 1);
+    }
+
+    #[test]
+    fn lost_messages_are_not_a_rate_change() {
+        let all = times(&[(300, 500)]);
+        for seed in 0..20_u64 {
+            let mut dice = seed;
+            let kept = all.iter().copied().filter(|_| {
+                dice = dice
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_041);
+                (dice >> 33) % 100 >= 30
+            });
+            let kept: Vec<Stamp> = kept.collect();
+            let joined = stretches(&kept).iter().filter(|s| s.is_joined).count();
+            assert_eq!(joined, 0, "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn a_rate_that_changes_is_cut_where_it_does() {
+        let found = reported(&[(300, 33), (60, 200)]);
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!((300..=302).contains(&found[0].0) && found[1].2, "{found:?}");
+        let slow = reported(&[(40, 1000), (12, 5000), (60, 1000)]);
+        assert_eq!(slow.len(), 3, "{slow:?}");
+        let long = reported(&[(50_000, 10), (30_000, 20)]);
+        assert_eq!(long.len(), 2, "{long:?}");
+        assert!((49_990..=50_012).contains(&long[0].0), "{long:?}");
+    }
+
+    #[test]
+    fn a_pause_is_a_gap_and_a_lost_message_is_not() {
+        let found = reported(&[(50, 100), (1, 30_000), (50, 100)]);
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!(!found[1].2);
+        assert_eq!(
+            reported(&[(50, 100), (1, 300), (50, 100), (1, 900), (50, 100)]).len(),
+            1
+        );
+    }
+
+    #[test]
+    fn random_arrivals_are_not_even() {
+        let mut at = 0;
+        let mut noise = 12_345_i64;
+        let times: Vec<Stamp> = (0..200)
+            .map(|_| {
+                noise = (noise * 48_271) % 2_147_483_647;
+                at += 1_000_000 * (noise % 997 + 1);
+                Stamp(at)
+            })
+            .collect();
+        let found = stretches(&times);
+        assert!(found.iter().all(|s| !s.is_even), "{found:?}");
+    }
+}

@@ -1,0 +1,397 @@
+//! The evidence for each element as a track: signs, ends and rhythms, from which its lifetimes are computed.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
+
+use crate::base::name::{is_feedback, is_log, lies_in};
+use crate::base::rhythm::{CROWD_NS, FOUND_NS, broken_after};
+use crate::base::role::{role, start};
+use crate::base::time::{Span, Stamp};
+use crate::evidence::collector::Recorded;
+use crate::evidence::conclude::Findings;
+use crate::evidence::inference::{ElementKey, Inference, Reliability, Validity};
+use crate::evidence::observation::Name;
+use crate::evidence::{Confidence, Evidence, SOURCES};
+use crate::graph::ById;
+use crate::graph::history::lifetimes::{Extent, Liveness, Pulse};
+use crate::graph::history::restarts::{Restart, Restarts};
+use crate::graph::history::senders::{Sender, Senders, Traffic};
+use crate::graph::history::{Stretch, begins_steadily};
+
+/// The track of every element.
+///
+/// Boxed, since the tree reserves much unused memory.
+pub(crate) type Tracks = BTreeMap<ElementKey, Box<Liveness>>;
+
+/// The elements that exist as long as others, each with its other.
+pub(crate) type Likes = Vec<(ElementKey, ElementKey)>;
+
+/// Adds the signs of all evidence to the track of its element. Takes the inferences out of the findings, of which
+/// there may be very many.
+pub(crate) fn tracks(
+    recorded: &Recorded,
+    findings: &mut Findings,
+    traffic: &Traffic,
+    (restarts, pauses): (&Restarts, &[Span]),
+) -> io::Result<(Tracks, Likes)> {
+    let mut tracks = Tracks::new();
+    let mut likes = Likes::new();
+    let sent = sent(&findings.inferences);
+    // Records of `/rosout` name their nodes themselves.
+    let mut data = findings
+        .streams
+        .iter()
+        .filter(|s| !is_log(s.connection.topic.as_str()));
+    let is_rewritten = data.any(|stream| stream.trust == Reliability::First);
+    let forwarded = forwarded(findings, traffic);
+    let asked = asked(findings, traffic);
+    let inferences = std::mem::take(&mut findings.inferences);
+    let findings = &*findings;
+    for inference in inferences {
+        let [node, _] = inference.what.ends();
+        let own = node.map_or(&[][..], |node| restarts.of(node));
+        let deaths: Vec<Stamp> = own.iter().map(|r| r.death).collect();
+        let track = tracks.entry(inference.what).or_default();
+        track.lasts |= lasts(&inference.when);
+        track.evidence = track.evidence.and(Evidence::row(inference.source));
+        track.confidence = track
+            .confidence
+            .min(confidence(&inference, findings, traffic));
+        match &inference.when {
+            Validity::Messages(at) => {
+                let stream = &findings.streams[*at];
+                let Some(senders) = traffic.get(stream.topic) else {
+                    continue;
+                };
+                let place = senders.place(*at).unwrap_or(0);
+                let with = node.and_then(|node| forwarded.get(&(node, stream.topic)));
+                let (with_start, with_end) = with.copied().unwrap_or_default();
+                let topic = stream.connection.topic.as_str();
+                let is_free = is_log(topic) || is_feedback(topic);
+                let what = Followed {
+                    known: node.is_none() && sent.contains(at),
+                    begins: !is_free && !with_start,
+                    beats: !is_free && !with_end,
+                    asked: node.and_then(|node| asked.some(node)).copied(),
+                    restarts: own,
+                    pauses,
+                };
+                follow(track, senders, place, &what);
+                if !deaths.is_empty() {
+                    let times = recorded.messages.times(stream.times)?;
+                    track.bound_all(&times, &deaths);
+                }
+            }
+            Validity::First(at) => {
+                let stream = &findings.streams[*at];
+                if let Some(senders) = traffic.get(stream.topic)
+                    && let Some(place) = senders.place(*at)
+                    && let Some((first, _)) = senders.traces[place]
+                {
+                    track.bound_all(&[first], &[]);
+                }
+            }
+            Validity::Signs { signs, ends } => {
+                let ends = together(ends, &deaths);
+                track.sign_all(signs, &ends);
+                if is_from(&inference, "statistics") {
+                    track.counted.extend(signs.first());
+                }
+                if SOURCES.get(inference.source).is_some_and(|s| s.own) {
+                    track.last_sign = track.last_sign.max(signs.last().copied());
+                    track.speaks = true;
+                }
+            }
+            Validity::Begins { signs, ends } => {
+                let ends = together(ends, &deaths);
+                track.bound_all(signs, &ends);
+                // Earlier messages of the node may have another's name.
+                if !is_rewritten || !is_from(&inference, "rosout") {
+                    track.begins.extend(signs);
+                }
+            }
+            Validity::Moments(signs) => track.bound_all(signs, &deaths),
+            Validity::Unending => track.unending = true,
+            Validity::Like(other) => likes.push((inference.what, *other)),
+            Validity::Whole => track.extent = track.extent.max(Extent::Whole),
+            Validity::Always => track.extent = Extent::Always,
+        }
+    }
+    for (node, restarts) in restarts.with_ids() {
+        for restart in restarts {
+            let track = tracks.entry(ElementKey::Node(node)).or_default();
+            track.signs.extend([restart.death, restart.birth]);
+            track.ends.push(restart.death);
+        }
+    }
+    Ok((tracks, likes))
+}
+
+/// The publications, as node and topic, that forward the messages of others, and whether they begin and end with
+/// these: then that says nothing about the node.
+fn forwarded(findings: &Findings, traffic: &Traffic) -> BTreeMap<(Name, Name), (bool, bool)> {
+    let bounds = |topic: Name, node: Option<Name>| {
+        let senders = traffic.get(topic).into_iter().flat_map(|of| &of.list);
+        let own = senders.filter(|s| node.is_none() || s.node == node);
+        let stretches = || own.clone().flat_map(|s| &s.stretches);
+        let first = stretches().map(|s| (s.first, s.period)).min();
+        first.zip(stretches().map(|s| (s.last, s.period)).max())
+    };
+    let kind = |topic: Name| {
+        let stream = findings.streams.iter().find(|s| s.topic == topic);
+        stream.map(|s| &s.connection.type_name)
+    };
+    let ends = |&(node, topic): &(Name, Name)| {
+        let inputs = findings
+            .inferences
+            .iter()
+            .filter_map(|inference| match inference.what {
+                ElementKey::Subscribe(input, of) if of == node && input != topic => Some(input),
+                _ => None,
+            });
+        let inputs: BTreeSet<Name> = inputs.filter(|input| kind(*input) == kind(topic)).collect();
+        let inputs = || inputs.iter().filter_map(|input| bounds(*input, None));
+        let ((first, early), (last, late)) = bounds(topic, Some(node))?;
+        inputs().next()?;
+        let began = inputs().any(|((input, _), _)| first.since(input) > broken_after(early));
+        let goes_on = inputs().any(|(_, (input, _))| input.since(last) > broken_after(late));
+        Some(((node, topic), (!began, !goes_on)))
+    };
+    findings.copies.iter().filter_map(ends).collect()
+}
+
+/// When others sent the first message to each node, on a topic below its name: what it sends at once is the answer
+/// of a node that was there.
+fn asked(findings: &Findings, traffic: &Traffic) -> ById<Name, Option<Stamp>> {
+    let senders = || traffic.iter().flat_map(|of| &of.list);
+    let nodes: BTreeMap<_, Name> = senders()
+        .filter_map(|sender| sender.node)
+        .map(|node| (findings.text(node), node))
+        .collect();
+    let mut asked: ById<Name, Option<Stamp>> = ById::default();
+    for (topic, of) in traffic.with_ids() {
+        let name = format!("/{}", findings.text(topic).trim_start_matches('/'));
+        let Some((space, _)) = name.rsplit_once('/') else {
+            continue;
+        };
+        let owner = nodes.get(space).filter(|_| lies_in(&name, space));
+        let others = of.list.iter().filter(|s| s.node.as_ref() != owner);
+        let first = others
+            .filter_map(|s| Some(s.stretches.first()?.first))
+            .min();
+        if let Some((owner, first)) = owner.zip(first) {
+            let known = asked.grown(*owner).get_or_insert(first);
+            *known = first.min(*known);
+        }
+    }
+    asked
+}
+
+/// The confidence of an inference: a connection without messages in the time that is read is only declared by
+/// its header.
+fn confidence(inference: &Inference, findings: &Findings, traffic: &Traffic) -> Confidence {
+    let Validity::Messages(at) = inference.when else {
+        return inference.confidence;
+    };
+    let senders = traffic.get(findings.streams[at].topic);
+    let sent = senders.and_then(|senders| senders.traces[senders.place(at)?]);
+    match sent {
+        Some(_) => inference.confidence,
+        None => inference.confidence.max(Confidence::Declared),
+    }
+}
+
+/// The streams with a known publisher, whose messages show a publication.
+fn sent(inferences: &[Inference]) -> BTreeSet<usize> {
+    let sent = inferences.iter().filter_map(|inference| match inference {
+        Inference {
+            what: ElementKey::Publish(..),
+            when: Validity::Messages(at),
+            ..
+        } => Some(*at),
+        _ => None,
+    });
+    sent.collect()
+}
+
+/// Whether an inference is from the source of this name.
+fn is_from(inference: &Inference, source: &str) -> bool {
+    SOURCES
+        .get(inference.source)
+        .is_some_and(|s| s.word == source)
+}
+
+/// Whether an inference is still valid after its last sign.
+fn lasts(when: &Validity) -> bool {
+    !matches!(when, Validity::Moments(_) | Validity::Like(_))
+}
+
+/// Both lists of times as one, sorted.
+fn together(a: &[Stamp], b: &[Stamp]) -> Vec<Stamp> {
+    let mut all = [a, b].concat();
+    all.sort_unstable();
+    all
+}
+
+/// The most messages of a latched topic: one with more is sent again all the time.
+const LATCHED: u64 = 20;
+
+/// Facts about a stream that is followed.
+struct Followed<'a> {
+    /// Whether it belongs to a topic with known senders: the topic exists as long as its publications.
+    known: bool,
+    /// Whether its beginning and its rhythm show when its sender exists, which has no log records.
+    begins: bool,
+    beats: bool,
+    /// When its sender got the first message of its own.
+    asked: Option<Stamp>,
+    restarts: &'a [Restart],
+    /// The times at which nothing was recorded.
+    pauses: &'a [Span],
+}
+
+/// Adds the messages of one stream to the track of a publication or topic.
+fn follow(track: &mut Liveness, senders: &Senders, place: usize, what: &Followed<'_>) {
+    let sender = senders.of.get(place).and_then(|of| senders.list.get(*of));
+    let sent = senders.traces.get(place).copied().flatten();
+    let (Some((first, last)), Some(sender)) = (sent, sender) else {
+        track.extent = track.extent.max(Extent::Whole);
+        return;
+    };
+    let count: u64 = sender.stretches.iter().map(|s| s.count).sum();
+    let latched = sender.latched && count <= LATCHED;
+    let messages = track.messages();
+    messages.senders.0 += 1;
+    messages.senders.1 += u32::from(latched);
+    if what.known {
+        track.seen.extend([first, last]);
+        return;
+    }
+    track.signs.extend([first, last]);
+    // A recorder receives a latched message as soon as it finds the topic, so the sender began about then, unless the
+    // first one recorded may be a repetition.
+    let period = sender.stretches.first().map_or(0, |s| s.period);
+    let due = sender.recording.0.plus(FOUND_NS.saturating_add(period));
+    let answers = |asked: Stamp| (0..=CROWD_NS).contains(&first.since(asked));
+    let is_proof = what.begins && first > due && !what.asked.is_some_and(answers);
+    if is_proof && (latched || begins_steadily(&sender.stretches)) {
+        track.begins.push(first);
+    }
+    track.last_sign = track.last_sign.max(Some(last));
+    let messages = track.messages();
+    messages.reach(Some(sender.recording));
+    messages.due = messages.due.max(Some(due));
+    let pulse = Pulse::of(&sender.stretches, what.restarts, what.pauses);
+    let pulse = pulse.filter(|_| what.beats && !latched);
+    messages.pulses.extend(pulse);
+}
+
+// Ends of the publishers of merged streams. A tool that rewrites bags keeps one connection per topic, so
+// that no message names its sender; but if only one node is known to publish a topic, the end of the topic's
+// rhythm is that of the node's. For example, only `/lidar` names `/scan` as its own, and `/scan` at 10 Hz stops at 50 s of
+// 300 s: `/lidar` ended at 50 s.
+
+/// Adds the rhythms that stopped for good to the tracks of their only publishers. A rhythm that continues
+/// shows nothing: another node may have taken over the topic.
+pub(crate) fn fall_silent(
+    tracks: &mut Tracks,
+    traffic: &Traffic,
+    findings: &Findings,
+    pauses: &[Span],
+) {
+    for (topic, nodes) in publishers(tracks).with_ids() {
+        let Some(sender) = merged(traffic, findings, topic) else {
+            continue;
+        };
+        for (node, stretches) in turns(nodes, sender, findings) {
+            let end = sender.recording.1.min(findings.mission.1);
+            let Some(track) = tracks.get_mut(&ElementKey::Publish(node, topic)) else {
+                continue;
+            };
+            if begins_steadily(stretches) {
+                track.begins.push(stretches[0].first);
+            }
+            let pulse = Pulse::of(stretches, &[], pauses).filter(|pulse| pulse.broke_off(end));
+            if let Some(pulse) = pulse {
+                track.signs.push(pulse.last());
+                track.last_sign = track.last_sign.max(Some(pulse.last()));
+                track.messages().pulses.push(pulse);
+            }
+        }
+    }
+}
+
+/// The known publishers of each topic.
+fn publishers(tracks: &Tracks) -> ById<Name, Vec<Name>> {
+    let mut all: ById<Name, Vec<Name>> = ById::default();
+    for what in tracks.keys() {
+        if let ElementKey::Publish(node, topic) = what {
+            all.grown(*topic).push(*node);
+        }
+    }
+    all
+}
+
+/// The sender that represents all senders of a merged topic, unless messages are latched.
+fn merged<'a>(traffic: &'a Traffic, findings: &Findings, topic: Name) -> Option<&'a Sender> {
+    let of = traffic.get(topic)?;
+    let is_merged = |at: &usize| findings.streams[*at].trust == Reliability::First;
+    let sender = of.list.iter().find(|sender| sender.node.is_none())?;
+    (of.streams.iter().all(is_merged) && !sender.latched).then_some(sender)
+}
+
+/// The messages of each of the publishers: all of them for a single one; for those of one role, which take turns, those
+/// from its start to the next one's.
+fn turns<'a>(
+    nodes: &[Name],
+    sender: &'a Sender,
+    findings: &Findings,
+) -> Vec<(Name, &'a [Stretch])> {
+    if let [only] = nodes {
+        return vec![(*only, &sender.stretches)];
+    }
+    let text = |node: &Name| findings.text(*node);
+    let born = |node: &Name| Some((start(&text(node))?, *node));
+    let births: Option<Vec<(Stamp, Name)>> = nodes.iter().map(born).collect();
+    let is_one_role = nodes
+        .windows(2)
+        .all(|p| role(&text(&p[0])) == role(&text(&p[1])));
+    let mut births = births.filter(|_| is_one_role).unwrap_or_default();
+    births.sort_unstable();
+    let ends = births.iter().skip(1).map(|(next, _)| *next);
+    let ends = ends.chain([Stamp::MAX]);
+    let turns = births.iter().zip(ends);
+    turns
+        .filter_map(|((from, node), to)| Some((*node, within(&sender.stretches, *from, to)?)))
+        .collect()
+}
+
+/// The stretches of a turn; `None` if one continues into the next turn, so that two publish at the same time.
+fn within(stretches: &[Stretch], from: Stamp, to: Stamp) -> Option<&[Stretch]> {
+    let first = stretches.partition_point(|s| s.first < from);
+    let next = stretches.partition_point(|s| s.first < to);
+    let own = stretches.get(first..next)?;
+    own.last().is_none_or(|last| last.last < to).then_some(own)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_ends_before_the_next_begins() {
+        let stretch = |first, last| Stretch {
+            first: Stamp(first),
+            last: Stamp(last),
+            count: 9,
+            period: 1,
+            is_even: true,
+            is_joined: false,
+        };
+        let all = [stretch(10, 20), stretch(30, 40)];
+        let turn = |from, to| within(&all, Stamp(from), Stamp(to)).map(<[Stretch]>::len);
+        assert_eq!(turn(5, 25), Some(1));
+        assert_eq!(turn(25, 50), Some(1));
+        assert_eq!(turn(5, 15), None);
+    }
+}
