@@ -157,7 +157,7 @@ pub(crate) fn pauses(
     streams: &[Stream],
 ) -> io::Result<Vec<Span>> {
     let mut senders = Vec::new();
-    for of_topic in traffic {
+    for of_topic in traffic.iter().flatten() {
         for (place, sender) in of_topic.list.iter().enumerate() {
             if sender.latched || sender.stretches.iter().all(|s| s.count < FEWEST) {
                 continue;
@@ -207,7 +207,7 @@ pub(crate) fn pauses(
 
 /// The times without any message that are too long for a mission: the clock was set in between.
 fn clock_jumps(traffic: &Traffic) -> Vec<Span> {
-    let senders = traffic.iter().flat_map(|of| &of.list);
+    let senders = traffic.iter().flatten().flat_map(|of| &of.list);
     let stretches = senders.flat_map(|sender| &sender.stretches);
     let mut sending: Vec<Span> = stretches.map(|s| Span::new(s.first, s.last)).collect();
     sending.sort_unstable_by_key(|span| span.start);

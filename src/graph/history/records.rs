@@ -157,7 +157,10 @@ fn assembled(
     findings: &Findings,
     (pauses, doubled): (Vec<Span>, BTreeSet<Name>),
 ) -> History {
-    let streams = traffic.iter().map(|of| of.streams.clone());
+    let streams = traffic.iter().map(|of| {
+        let streams = of.as_ref().map(|of| of.streams.clone());
+        streams.unwrap_or_default()
+    });
     let mut all = Assembly {
         history: History {
             streams: streams.collect(),
@@ -216,7 +219,7 @@ fn roomy(tracks: &Tracks) -> History {
 /// The messages that each node sends, without latched ones.
 fn sent(traffic: &Traffic) -> ById<Name, Vec<&TopicSender>> {
     let mut sent: ById<Name, Vec<&TopicSender>> = ById::default();
-    let senders = traffic.iter().flat_map(|of| &of.list);
+    let senders = traffic.iter().flatten().flat_map(|of| &of.list);
     for sender in senders.filter(|sender| !sender.latched) {
         if let Some(node) = sender.node {
             sent.grown(node).push(sender);
@@ -238,7 +241,7 @@ struct Assembly<'a> {
 impl Assembly<'_> {
     /// Adds the messages of every sender.
     fn senders(&mut self) {
-        for (topic, of) in self.traffic.with_ids() {
+        for (topic, of) in self.traffic.somes() {
             let Some(id) = self.history.topic_ids.some(topic) else {
                 continue;
             };
@@ -315,7 +318,7 @@ impl Assembly<'_> {
     fn topic(&mut self, name: Name, track: &Liveness) {
         let silent = self.topic_silences(name, &spans(track));
         let unknown_publishers = self.unknown_publishers(name);
-        let traffic = self.traffic.get(name);
+        let traffic = self.traffic.some(name);
         let streams = traffic.iter().flat_map(|of| &of.streams);
         let values = &self.findings.values;
         let mut types: Vec<_> = streams
@@ -350,7 +353,7 @@ impl Assembly<'_> {
         let Some(edge) = self.edge(node, topic, track) else {
             return;
         };
-        let senders = self.traffic.get(topic).map(|of| &of.list);
+        let senders = self.traffic.some(topic).map(|of| &of.list);
         let sender = senders.and_then(|all| all.iter().find(|s| s.node == Some(node)));
         let silent = self.silences(sender.into_iter(), &spans(track));
         let id = self.history.elements.publishes.push(edge);
@@ -382,7 +385,7 @@ impl Assembly<'_> {
 
     /// The times at which all senders of a topic are silent.
     fn topic_silences(&self, topic: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
-        let all = self.traffic.get(topic).into_iter().flat_map(|of| &of.list);
+        let all = self.traffic.some(topic).into_iter().flat_map(|of| &of.list);
         self.silences(all.filter(|sender| !sender.latched), lives)
     }
 

@@ -86,7 +86,7 @@ impl Own<'_> {
 /// The streams of each publisher with a reliable name.
 fn own_streams<'a>(findings: &Findings, traffic: &'a Traffic) -> ById<Name, Vec<Own<'a>>> {
     let mut own: ById<Name, Vec<Own<'a>>> = ById::default();
-    for (topic, all) in traffic.with_ids() {
+    for (topic, all) in traffic.somes() {
         let mut streams: Vec<Vec<usize>> = vec![Vec::new(); all.list.len()];
         for (at, of) in all.streams.iter().zip(&all.of) {
             streams[*of].push(*at);

@@ -15,10 +15,10 @@ use crate::graph::ById;
 use crate::graph::history::recordings::recordings;
 use crate::graph::history::{LongestPauses, Stretch};
 
-/// The senders of each topic.
-pub(crate) type Traffic = ById<Name, Senders>;
+/// The senders of each topic; boxed, since most names may be those of other things.
+pub(crate) type Traffic = ById<Name, Option<Box<Senders>>>;
 
-/// The senders of one topic; empty for other names.
+/// The senders of one topic.
 pub(crate) struct Senders {
     /// The indices of the topic's streams, sorted.
     pub(crate) streams: Vec<usize>,
@@ -63,7 +63,11 @@ pub(crate) fn traffic(recorded: &Recorded, findings: &Findings) -> Result<Traffi
     for (at, stream) in findings.streams.iter().enumerate() {
         streams.grown(stream.topic).push(at);
     }
-    let of_topic = |of| senders(recorded, findings, &recordings, of);
+    let of_topic = |of: Vec<usize>| {
+        let is_topic = !of.is_empty();
+        let read = || senders(recorded, findings, &recordings, of).map(Box::new);
+        is_topic.then(read).transpose()
+    };
     let all: io::Result<Traffic> = streams.into_iter().map(of_topic).collect();
     all.map_err(spool_error)
 }

@@ -60,7 +60,7 @@ pub(crate) fn tracks(
         match &inference.when {
             Validity::Messages(at) => {
                 let stream = &findings.streams[*at];
-                let Some(senders) = traffic.get(stream.topic) else {
+                let Some(senders) = traffic.some(stream.topic) else {
                     continue;
                 };
                 let place = senders.place(*at).unwrap_or(0);
@@ -84,7 +84,7 @@ pub(crate) fn tracks(
             }
             Validity::First(at) => {
                 let stream = &findings.streams[*at];
-                if let Some(senders) = traffic.get(stream.topic)
+                if let Some(senders) = traffic.some(stream.topic)
                     && let Some(place) = senders.place(*at)
                     && let Some((first, _)) = senders.traces[place]
                 {
@@ -131,7 +131,7 @@ pub(crate) fn tracks(
 /// these: then that says nothing about the node.
 fn forwarded(findings: &Findings, traffic: &Traffic) -> BTreeMap<(Name, Name), (bool, bool)> {
     let bounds = |topic: Name, node: Option<Name>| {
-        let senders = traffic.get(topic).into_iter().flat_map(|of| &of.list);
+        let senders = traffic.some(topic).into_iter().flat_map(|of| &of.list);
         let own = senders.filter(|s| node.is_none() || s.node == node);
         let stretches = || own.clone().flat_map(|s| &s.stretches);
         let first = stretches().map(|s| (s.first, s.period)).min();
@@ -163,13 +163,13 @@ fn forwarded(findings: &Findings, traffic: &Traffic) -> BTreeMap<(Name, Name), (
 /// When others sent the first message to each node, on a topic below its name: what it sends at once is the answer
 /// of a node that was there.
 fn asked(findings: &Findings, traffic: &Traffic) -> ById<Name, Option<Stamp>> {
-    let senders = || traffic.iter().flat_map(|of| &of.list);
+    let senders = || traffic.iter().flatten().flat_map(|of| &of.list);
     let nodes: BTreeMap<_, Name> = senders()
         .filter_map(|sender| sender.node)
         .map(|node| (findings.text(node), node))
         .collect();
     let mut asked: ById<Name, Option<Stamp>> = ById::default();
-    for (topic, of) in traffic.with_ids() {
+    for (topic, of) in traffic.somes() {
         let name = format!("/{}", findings.text(topic).trim_start_matches('/'));
         let Some((space, _)) = name.rsplit_once('/') else {
             continue;
@@ -193,7 +193,7 @@ fn confidence(inference: &Inference, findings: &Findings, traffic: &Traffic) -> 
     let Validity::Messages(at) = inference.when else {
         return inference.confidence;
     };
-    let senders = traffic.get(findings.streams[at].topic);
+    let senders = traffic.some(findings.streams[at].topic);
     let sent = senders.and_then(|senders| senders.traces[senders.place(at)?]);
     match sent {
         Some(_) => inference.confidence,
@@ -334,7 +334,7 @@ fn publishers(tracks: &Tracks) -> ById<Name, Vec<Name>> {
 
 /// The sender that represents all senders of a merged topic, unless messages are latched.
 fn merged<'a>(traffic: &'a Traffic, findings: &Findings, topic: Name) -> Option<&'a Sender> {
-    let of = traffic.get(topic)?;
+    let of = traffic.some(topic)?;
     let is_merged = |at: &usize| findings.streams[*at].trust == Reliability::First;
     let sender = of.list.iter().find(|sender| sender.node.is_none())?;
     (of.streams.iter().all(is_merged) && !sender.latched).then_some(sender)
