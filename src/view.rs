@@ -1,4 +1,9 @@
 //! The view of a mission: the full graph filtered, grouped and collapsed; the full graph stays as it is.
+//!
+//! In come a mission and [`ViewOptions`]; out comes a [`View`]: boxes, arrows and namespaces, and for each window their looks
+//! and the words for its changes. Open `items` first: it asks `choose` which elements are visible, `fold` which of them are
+//! one box, and `listed` which are only words. `frames` then goes through the windows: `state` says what exists, `marked`
+//! what changes, `caption` puts it into words; `steady` removes flicker between windows.
 
 mod caption;
 mod choose;
@@ -211,9 +216,9 @@ pub enum ArrowKind {
     Publish,
     /// From a topic to a node that subscribes to it.
     Subscribe,
-    /// From a node to a node over this topic (mode *nodes only*).
+    /// From a node to a node over this topic ([`Mode::Nodes`] in graph files).
     Direct(Arc<str>),
-    /// Between two boxes, over all topics between them in both directions (mode *bundles*).
+    /// Between two boxes, over all topics between them in both directions ([`Mode::Nodes`] in pictures).
     Bundle,
 }
 

@@ -212,7 +212,7 @@ impl<'a> ShownWindows<'a> {
         };
         self.items.take_touched();
         self.arrows.take_touched();
-        let (changes, now) = (&self.changes, (self.viewed, &self.now));
+        let (changes, now) = (&self.changes, &self.now);
         let there = |id| (changes.before.items[id], changes.after.items[id]);
         let items = self.viewed.items.ids();
         let items = items.map(|id| changes.item(now, id, there(id)));
@@ -245,7 +245,7 @@ impl<'a> ShownWindows<'a> {
                 MemberState::Left | MemberState::Away => MemberState::Away,
             };
         }
-        let (changes, now) = (&self.changes, (self.viewed, &self.now));
+        let (changes, now) = (&self.changes, &self.now);
         let (after, stays) = (&changes.after, (true, true));
         for id in self.items.take_touched() {
             let shown = after.items[id].then(|| changes.item(now, id, stays));

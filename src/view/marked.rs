@@ -250,14 +250,9 @@ pub(crate) type EndMark<'a> = (Option<Mark>, &'a [EventId]);
 
 impl WindowChanges {
     /// The look of an item; `there` is whether it exists before and after.
-    pub(crate) fn item(
-        &self,
-        (viewed, now): (&Viewed<'_>, &Now<'_>),
-        id: ItemId,
-        there: (bool, bool),
-    ) -> Option<Shown> {
+    pub(crate) fn item(&self, now: &Now<'_>, id: ItemId, there: (bool, bool)) -> Option<Shown> {
         let mut shown = marked(now.item(id)?, there, self.marks.items.get(&id))?;
-        if viewed.items[id].kind == ItemKind::Namespace {
+        if now.viewed.items[id].kind == ItemKind::Namespace {
             shown.inside = self.inside(&shown);
         }
         Some(shown)
@@ -266,36 +261,31 @@ impl WindowChanges {
     /// The look of an arrow, which appears and vanishes with its ends, unless it has events of its own.
     pub(crate) fn arrow(
         &self,
-        (viewed, now): (&Viewed<'_>, &Now<'_>),
+        now: &Now<'_>,
         id: ArrowId,
         there: (bool, bool),
         ends: [Option<EndMark<'_>>; 2],
     ) -> Option<Shown> {
-        let arrow = viewed.arrows.get(id)?;
+        let arrow = now.viewed.arrows.get(id)?;
         let shown = now.arrow(id)?;
         let reported = self.marks.arrows.get(&id).cloned();
         let reported = reported.or_else(|| with_ends(there, ends));
         let mut shown = marked(shown, there, reported.as_ref())?;
         if arrow.kind == ArrowKind::Bundle {
             shown.inside = self.inside(&shown);
-            self.mark_topics((viewed, now), arrow, &mut shown);
+            self.mark_topics(now, arrow, &mut shown);
         }
         Some(shown)
     }
 
     /// Marks the topics of a bundle, unless it appeared or vanished as a whole.
-    fn mark_topics(
-        &self,
-        (viewed, now): (&Viewed<'_>, &Now<'_>),
-        arrow: &Arrow,
-        shown: &mut Shown,
-    ) {
+    fn mark_topics(&self, now: &Now<'_>, arrow: &Arrow, shown: &mut Shown) {
         if shown.mark.is_none_or(|mark| mark.class() != "changed") {
             return;
         }
         let id = ArrowId(shown.id);
         for row in &mut shown.topics {
-            let has = |items: &LivingItems| items.has_topic(viewed, id, row.topic);
+            let has = |items: &LivingItems| items.has_topic(now.viewed, id, row.topic);
             let there = (has(&self.before), has(&self.after));
             match there {
                 (false, true) => row.mark = Some(Mark::Added),
@@ -303,8 +293,8 @@ impl WindowChanges {
                 _ => {
                     let name = &arrow.topics[row.topic as usize];
                     for event in shown.events.iter().filter_map(|id| now.event(*id)) {
-                        let topic = viewed.elements.ends(event.what).1;
-                        if topic.is_some_and(|topic| viewed.bundled[topic] == *name) {
+                        let topic = now.viewed.elements.ends(event.what).1;
+                        if topic.is_some_and(|topic| now.viewed.bundled[topic] == *name) {
                             (row.mark, row.rates) = changed(event);
                         }
                     }

@@ -81,7 +81,7 @@ pub(crate) fn shows_node(state: State, options: &ViewOptions) -> bool {
 pub(crate) struct Now<'a> {
     mission: &'a Mission,
     options: &'a ViewOptions,
-    viewed: &'a Viewed<'a>,
+    pub(crate) viewed: &'a Viewed<'a>,
     /// The current window, or an earlier one of the same length.
     span: Span,
     /// The elements that exist in it, and those that pause.
