@@ -156,7 +156,13 @@ pub(crate) fn together(
     }
     for row in &mut rows {
         row.lives = Span::joined(std::mem::take(&mut row.lives), 0);
-        let bars = row.lives.iter().map(|life| SendingBar::new(*life, JOINED));
+        // Without space for both, lifetimes are drawn instead of times of publishing.
+        let spans = match (is_complete, row.labels.len()) {
+            (false, _) => row.lives.clone(),
+            (true, 1) => continue,
+            (true, _) => Span::joined(row.bars.iter().map(|bar| bar.span).collect(), near / 2),
+        };
+        let bars = spans.into_iter().map(|span| SendingBar::new(span, JOINED));
         row.bars = bars.collect();
     }
     rows.sort_by(|a, b| (a.start(), &a.labels).cmp(&(b.start(), &b.labels)));
@@ -196,6 +202,7 @@ impl Row {
     fn join(&mut self, other: Self) {
         self.labels.extend(other.labels);
         self.lives.extend(other.lives);
+        self.bars.extend(other.bars);
         self.hz = [self.hz, other.hz]
             .into_iter()
             .flatten()

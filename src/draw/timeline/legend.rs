@@ -84,8 +84,7 @@ pub(crate) fn signs(timeline: &Timeline) -> Vec<Unbroken> {
     add(has(Sign::Start), start, "starts");
     let end: InlineSign = (1.2, |c, x, y| sign(c, Sign::End, x + 0.6, y));
     add(has(Sign::End), end, "ends");
-    let is_given = marks().any(|mark| timeline.giver(mark).is_some());
-    add(is_given, (LONG, arrow), "topic is taken over");
+    add(has(Sign::Handover), (LONG, arrow), "topic is taken over");
     let dot: InlineSign = (1.0, |c, x, y| sign(c, Sign::Dot, x + 0.5, y));
     add(has(Sign::Dot), dot, "other change");
     items

@@ -168,8 +168,7 @@ impl Row {
 
     /// The ticks and crosses.
     pub(super) fn turns(&self) -> impl Iterator<Item = &RowMark> {
-        let marks = self.marks.iter();
-        marks.filter(|mark| mark.is_turn())
+        self.marks.iter().filter(|mark| mark.is_turn())
     }
 
     /// Whether it ends for good: its last tick or cross is a cross.
