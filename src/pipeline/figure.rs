@@ -127,10 +127,7 @@ fn of_graph(
             },
         ));
     }
-    let remarks = composed
-        .notices
-        .iter()
-        .map(|notice| notice.text.to_string());
+    let remarks = composed.notices.iter().map(|notice| notice.text.clone());
     let remarks = remarks.collect();
     let picture = measured.with(composed.layout).scene(0);
     Ok((graph::page(sheet, picture), remarks))

@@ -57,7 +57,7 @@ impl View {
             let (from, to) = (place(arrow.from)?, place(arrow.to)?);
             Some(super::Arrow { from, to, ..arrow })
         });
-        let view = View {
+        let view = Self {
             items: items
                 .iter()
                 .map(|shown| relative(&self.items[shown.item()], home.as_deref()))
@@ -69,7 +69,7 @@ impl View {
                 crowds: Vec::new(),
                 ..frame.clone()
             }],
-            ..View::default()
+            ..Self::default()
         };
         Some(News {
             left_out: seen.items.len() - view.items.len(),
