@@ -79,7 +79,7 @@ fn rendering_exported_json_gives_the_same_bytes() {
             "warehouse.bag",
             &[],
             &["x.pdf"],
-            &["--kind", "map"],
+            &["--kind", "graph"],
         ),
         (
             "figure",

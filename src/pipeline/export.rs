@@ -205,6 +205,10 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
     };
     let is_drawn = job.outputs.iter().any(is_graph);
     let is_timeline = is_drawn && drawing.body.is_timeline(&mission);
+    if is_timeline {
+        // Its rows show when everything was there.
+        drawing.view.is_still = Some(false);
+    }
     let source = FigureSource::new(
         &mission,
         &drawing.view.ns_filter,
