@@ -45,6 +45,7 @@ pub use gate::{
 pub use phases::Phases;
 #[cfg(feature = "render")]
 pub(crate) use purpose::Medium;
+#[cfg(feature = "render")]
 pub use purpose::Purpose;
 pub use read::{Reading, explain, read};
 #[cfg(feature = "render")]

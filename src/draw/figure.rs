@@ -10,7 +10,6 @@ mod tex;
 
 use crate::base::words::worded;
 use crate::draw::scene::Scene;
-
 use crate::draw::timeline::source::FigureSource;
 pub(crate) use tex::file as latex;
 
@@ -29,12 +28,12 @@ worded! {
 }
 
 worded! {
-    /// The kind of element that rows and boxes represent.
+    /// The kind of element that the rows of lifelines represent.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum RowKind {
         /// Nodes, by role.
         Nodes = "nodes",
-        /// Nodes that start and stop together; in maps and steps, of one namespace and in the same phases.
+        /// Nodes that start and stop together.
         Groups = "groups",
         /// Topics.
         Topics = "topics",
@@ -50,9 +49,9 @@ pub struct FigureOptions {
     pub width_mm: f64,
     /// The size of names in points, 7 to 12; all other text is 1 pt smaller.
     pub text_pt: f64,
-    /// The kind of element that rows and boxes represent; `None` for the most detailed that fits.
+    /// The kind of element that the rows of lifelines represent; `None` for the most detailed that fits.
     pub rows: Option<RowKind>,
-    /// The boundaries that `Kind::Steps` shows, by the number of the phase that begins, ≥ 2; the largest if empty.
+    /// The boundaries that [`FigureKind::Steps`] shows, by the number of the phase that begins, ≥ 2; the largest if empty.
     pub steps: Vec<usize>,
     /// Whether legend and notes are left to the caption.
     pub is_bare: bool,

@@ -6,6 +6,7 @@ use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
 use crate::base::name::last_part;
 use crate::base::time::Stamp;
+use crate::base::words;
 use crate::draw::figure::page::{FigureSheet, nothing};
 use crate::draw::figure::steps::{StepPanel, graph_width};
 use crate::draw::figure::{self, Figure, FigureKind, graph, steps};
@@ -24,6 +25,8 @@ use crate::view::{Mark, Mode, View, ViewOptions, view};
 
 /// Pixels of a scene per millimetre of paper, 96 to the inch.
 const PX_PER_MM: f64 = 96.0 / 25.4;
+/// The most namespaces that a remark names.
+const MOST_NAMED: usize = 3;
 /// The number of steps shown unless some are requested.
 const SHOWN: usize = 6;
 /// The height of a panel beside its graph in pixels, for the area that a panel takes.
@@ -127,8 +130,17 @@ fn of_graph(
             },
         ));
     }
-    let remarks = composed.notices.iter().map(|notice| notice.text.clone());
-    let remarks = remarks.collect();
+    let folded: Vec<&str> = composed
+        .options
+        .collapse
+        .iter()
+        .map(|name| &**name)
+        .collect();
+    let remark = || {
+        let names = words::some_of(&folded, MOST_NAMED);
+        format!("not all nodes fit, so that each of these namespaces is one box: {names}")
+    };
+    let remarks = (!folded.is_empty()).then(remark).into_iter().collect();
     let picture = measured.with(composed.layout).scene(0);
     Ok((graph::page(sheet, picture), remarks))
 }
