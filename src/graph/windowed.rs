@@ -585,7 +585,7 @@ pub(crate) struct TopicCount {
     pub count: u64,
 }
 
-/// Counts the messages of every topic in every window, before any conclusions. Windows are as for [`super::graphs`].
+/// Counts the messages of every topic in every window, before any conclusions. Windows are as for [`super::graphs()`].
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
