@@ -185,7 +185,7 @@ fn every_mark_of_a_figure_is_an_event_of_the_log() {
         for (figure, width) in [
             ("lives", "88mm"),
             ("lives", "181mm"),
-            ("map", "181mm"),
+            ("graph", "181mm"),
             ("steps", "181mm"),
         ] {
             let at = format!("{figure} at {width} of {}", bag.display());

@@ -122,7 +122,7 @@ def figure(
     bags: Bags,
     outputs: Paths,
     *,
-    kind: Literal["lives", "map", "steps", "changes"] = "lives",
+    kind: Literal["lives", "graph", "steps"] = "lives",
     width: str | None = None,
     rows: str | None = None,
     steps: str | None = None,
