@@ -12,10 +12,14 @@ sha256sum "$bag" > SHA256SUMS
 "$bagreel" events "$bag" --format csv > events.csv
 # A column is 88 mm wide, the page 180 mm. Figures of that --width are included without scaling, so that 6 pt stay 6 pt.
 # With --bare, the legend is part of the caption in the .tex file.
-for figure in lives:88mm graph:88mm steps:180mm; do
-    "$bagreel" figure "$bag" --kind "${figure%%:*}" --width "${figure##*:}" --phases phases.txt --bare \
-        -o "${figure%%:*}.pdf" -o "${figure%%:*}.tex"
-done
+figure() {
+    kind=$1
+    shift
+    "$bagreel" figure "$bag" --kind "$kind" "$@" --phases phases.txt --bare -o "$kind.pdf" -o "$kind.tex"
+}
+figure lives --width 88mm
+figure graph --width 88mm
+figure steps --width 180mm --steps 3,4
 if ! command -v pdflatex > /dev/null; then
     echo "the page is not typeset: pdflatex is not installed" >&2
     exit 0
