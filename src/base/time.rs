@@ -75,6 +75,12 @@ impl Span {
         Self { start, end }
     }
 
+    /// The part of this time that is over at a moment, 0 to 1.
+    pub(crate) fn part(&self, at: Stamp) -> f64 {
+        let whole = self.nanos().max(1) as f64;
+        (at.since(self.start) as f64 / whole).clamp(0.0, 1.0)
+    }
+
     /// The overlap of two intervals in nanoseconds; 0 or less if there is none.
     pub(crate) fn shared(&self, other: Self) -> i64 {
         self.end.min(other.end).since(self.start.max(other.start))

@@ -233,6 +233,34 @@ impl Stroke {
 }
 
 impl Group {
+    /// The group `by` times as large, its page's corner at `to`.
+    pub(crate) fn placed(&self, by: f64, to: Point) -> Self {
+        let point = |p: Point| Point::new(to.x + p.x * by, to.y + p.y * by);
+        let rect = |r: &Rect| r.scaled(by).moved(to);
+        let form = |form: &Form| match form {
+            Form::Rect(r, radius) => Form::Rect(rect(r), radius * by),
+            Form::Ellipse(r) => Form::Ellipse(rect(r)),
+            Form::Path(steps) => Form::Path(steps.iter().map(|step| step.mapped(point)).collect()),
+        };
+        let piece = |piece: &Piece| match piece {
+            Piece::Shape(shape) => Piece::Shape(Shape {
+                form: form(&shape.form),
+                fill: shape.fill,
+                stroke: shape.stroke.scaled(by),
+            }),
+            Piece::Text(text) => Piece::Text(Text {
+                at: point(text.at),
+                size: text.size * by,
+                halo: text.halo.map(|(color, width)| (color, width * by)),
+                ..text.clone()
+            }),
+        };
+        Self {
+            pieces: self.pieces.iter().map(piece).collect(),
+            ..self.clone()
+        }
+    }
+
     /// A group outside of the graph, such as a title: an id, which is also its class, and no content yet.
     pub fn named(id: &str) -> Self {
         Self {

@@ -10,6 +10,7 @@ use crate::draw::picture::{Measured, PageOptions, Picture};
 use crate::draw::scene::{Anchor, Form, Group, Piece, Scene, Shape, Stroke, Text};
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
+use crate::draw::timeline::canvas::PX_PER_MM;
 use crate::layout::{self, Engine, Layout};
 use crate::mission::Mission;
 use crate::view::View;
@@ -19,8 +20,6 @@ pub use choice::Choice;
 const SMALLEST_PT: f64 = 6.0;
 /// Points per pixel, 96 pixels to the inch.
 const PT_PER_PX: f64 = 0.75;
-/// Pixels per millimetre, 96 to the inch.
-const PX_PER_MM: f64 = 96.0 / 25.4;
 /// The smallest legible text on a screen, in pixels.
 const SMALLEST_PX: f64 = 9.0;
 /// The font size of times and captions in pixels: on paper (6.75 pt) and on a screen.
@@ -296,7 +295,7 @@ impl<'a> StripSource<'a> {
         let aside = (page.panel.w - scene.size.w * page.scale).max(0.0) / 2.0;
         let corner = Point::new(corner.x + aside, corner.y);
         for group in &scene.groups {
-            let mut group = moved(group, page.scale, corner);
+            let mut group = group.placed(page.scale, corner);
             group.id = format!("w{}-{}", frame.index, group.id);
             groups.push(group);
         }
@@ -335,7 +334,7 @@ impl<'a> StripSource<'a> {
             .filter_map(piece_bounds)
             .reduce(|a, b| a.union(&b));
         let Some(bounds) = bounds else { return GAP };
-        groups.push(moved(&legend, by, Point::new(0.0, y - bounds.y * by)));
+        groups.push(legend.placed(by, Point::new(0.0, y - bounds.y * by)));
         bounds.h * by + GAP
     }
 }
@@ -357,34 +356,6 @@ fn piece_bounds(piece: &Piece) -> Option<Rect> {
             0.0,
             text.size * 1.3,
         )),
-    }
-}
-
-/// A group `by` times as large, its page's corner at `to`.
-pub(crate) fn moved(group: &Group, by: f64, to: Point) -> Group {
-    let point = |p: Point| Point::new(to.x + p.x * by, to.y + p.y * by);
-    let rect = |r: &Rect| r.scaled(by).moved(to);
-    let form = |form: &Form| match form {
-        Form::Rect(r, radius) => Form::Rect(rect(r), radius * by),
-        Form::Ellipse(r) => Form::Ellipse(rect(r)),
-        Form::Path(steps) => Form::Path(steps.iter().map(|step| step.mapped(point)).collect()),
-    };
-    let piece = |piece: &Piece| match piece {
-        Piece::Shape(shape) => Piece::Shape(Shape {
-            form: form(&shape.form),
-            fill: shape.fill,
-            stroke: shape.stroke.scaled(by),
-        }),
-        Piece::Text(text) => Piece::Text(Text {
-            at: point(text.at),
-            size: text.size * by,
-            halo: text.halo.map(|(color, width)| (color, width * by)),
-            ..text.clone()
-        }),
-    };
-    Group {
-        pieces: group.pieces.iter().map(piece).collect(),
-        ..group.clone()
     }
 }
 

@@ -14,8 +14,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use self::partition::partition;
-pub(crate) use self::presence::knows_publishers;
 use self::presence::{Presence, is_topics, presences};
+pub(crate) use self::presence::{fill, knows_publishers};
 use crate::base::time::{Span, Stamp};
 use crate::graph::history::Sending;
 use crate::graph::{Elements, TopicId};

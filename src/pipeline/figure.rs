@@ -12,6 +12,7 @@ use crate::draw::figure::steps::{StepPanel, graph_width};
 use crate::draw::figure::{self, Figure, FigureKind, graph, steps};
 use crate::draw::picture::{Measured, PageOptions};
 use crate::draw::scene::Scene;
+use crate::draw::timeline::canvas::PX_PER_MM;
 use crate::draw::timeline::source::FigureSource;
 use crate::draw::timeline::{drawer::clock, phases::title};
 use crate::export::Output;
@@ -23,8 +24,6 @@ use crate::mission::event_log::Detail;
 use crate::view::news::News;
 use crate::view::{Mark, Mode, View, ViewOptions, view};
 
-/// Pixels of a scene per millimetre of paper, 96 to the inch.
-const PX_PER_MM: f64 = 96.0 / 25.4;
 /// The most namespaces that a remark names.
 const MOST_NAMED: usize = 3;
 /// The number of steps shown unless some are requested.
@@ -339,7 +338,7 @@ fn panel(
     StepPanel {
         number: format!("{k} → {}", k + 1),
         words: format!("{} {}", clock(start), title(source, k)),
-        home: news.home.as_deref().unwrap_or_default().to_owned(),
+        home: news.home.clone().unwrap_or_default(),
         picture,
         span,
         handovers: ids.iter().filter_map(handover).collect(),

@@ -2,8 +2,10 @@
 
 use crate::base::geometry::Size;
 use crate::base::words::worded;
+use crate::draw::figure::MOST_HEIGHT;
 use crate::draw::picture::PageOptions;
 use crate::draw::style::{PRINTED_NAMES, Style};
+use crate::draw::timeline::canvas::PX_PER_MM;
 
 worded! {
     /// The medium of a picture.
@@ -20,11 +22,8 @@ worded! {
     }
 }
 
-/// Pixels per millimetre and per point on paper, 96 to the inch.
-const PX_PER_MM: f64 = 96.0 / 25.4;
+/// Pixels per point on paper, 96 to the inch.
 const PX_PER_PT: f64 = 96.0 / 72.0;
-/// The largest height of a drawing on paper, in millimetres: the text block of a page.
-const HIGHEST: f64 = 225.0;
 /// The size of names on paper in points; all other text is a point smaller, and 6 pt is what journals accept at least.
 const NAMES: f64 = 7.0;
 /// The smallest legible text on a screen, in pixels.
@@ -70,7 +69,7 @@ impl From<Purpose> for Medium {
 impl Medium {
     /// Paper of this width in millimetres, with names of this size in points.
     pub(crate) fn paper(width_mm: f64, text_pt: f64) -> Self {
-        let (width, most) = (width_mm * PX_PER_MM, HIGHEST * PX_PER_MM);
+        let (width, most) = (width_mm * PX_PER_MM, MOST_HEIGHT * PX_PER_MM);
         let parts = [0.2, 0.4, 0.6, 0.8, 1.0];
         Self {
             sizes: parts.map(|part| Size::new(width, most * part)).to_vec(),

@@ -12,7 +12,7 @@ pub(crate) struct News {
     /// The view, with that window alone.
     pub(crate) view: View,
     /// The namespace that most names are in, and relative to which they are written; none for the root.
-    pub(crate) home: Option<Arc<str>>,
+    pub(crate) home: Option<String>,
     /// The number of items of the window that are left out.
     pub(crate) left_out: usize,
 }
@@ -73,7 +73,7 @@ impl View {
         };
         Some(News {
             left_out: seen.items.len() - view.items.len(),
-            home: home.map(Arc::from),
+            home,
             view,
         })
     }

@@ -4,18 +4,18 @@
 //! In a film, a node that ended in a window is drawn as ended. In a still of a mission of an hour, that would make
 //! a planner that ran for 59 minutes grey.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::steady::Lengths;
 use super::{
     Counts, Frame, Item, ItemId, Looks, Mark, Phrase, SeenWindow, Shown, TopicRow, View,
     sum as added,
 };
-use crate::base::time::{Span, Stamp};
+use crate::base::time::Span;
 use crate::base::words;
 use crate::graph::{ById, Element};
-use crate::mission::Mission;
-use crate::mission::event_log::{Event, Kind};
+use crate::mission::event_log::Kind;
+use crate::mission::{EventId, Mission};
 
 /// The times at which a box of a still was there.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -36,11 +36,10 @@ pub(super) fn still(mut view: View, mission: &Mission) -> View {
     for looks in rows.chain(also).chain(boxes) {
         *looks = Looks::of([whole(looks, &lengths).as_ref()]);
     }
-    let presences: ById<ItemId, Presence> = view
-        .items
-        .iter()
-        .map(|item| presence(item, mission))
-        .collect();
+    let marks = marks(mission);
+    let items = view.items.iter();
+    let presences: ById<ItemId, Presence> =
+        items.map(|item| presence(item, mission, &marks)).collect();
     if presences.iter().any(|presence| !presence.marks.is_empty()) {
         view.presences = presences;
     }
@@ -152,31 +151,43 @@ fn add_row(sum: &mut TopicRow, row: &TopicRow) {
     sum.count = added(sum.count, row.count, u64::saturating_add);
 }
 
-/// The times of the nodes in a box; none for a box of topics.
-fn presence(item: &Item, mission: &Mission) -> Presence {
-    let nodes = || item.members.iter().filter(|what| what.is_node());
-    let whole = mission.span;
-    let part =
-        |at: Stamp| (at.since(whole.start) as f64 / whole.nanos().max(1) as f64).clamp(0.0, 1.0);
-    let lives = nodes().flat_map(|what| mission.elements.seen(*what).lives.iter().copied());
-    let times = Span::joined(lives.collect(), 0);
-    let mark = |event: &Event| {
+/// Marks of nodes, each with its event, as parts of the mission's time.
+type NodeMarks = BTreeMap<Element, Vec<(EventId, f64, Mark)>>;
+
+/// The starts, ends and restarts of each node in the log, in its order.
+fn marks(mission: &Mission) -> NodeMarks {
+    let mut marks = NodeMarks::new();
+    let events = mission.log.events.with_ids();
+    for (id, event) in events.filter(|(_, event)| event.is_headline() && event.what.is_node()) {
         let mark = match event.kind {
             Kind::Started => Mark::Added,
             Kind::Stopped => Mark::Removed,
             Kind::Restarted => Mark::Restarted,
-            _ => return None,
+            _ => continue,
         };
-        Some((part(event.time), mark))
-    };
-    let is_own = |event: &&Event| event.is_headline() && nodes().any(|what| *what == event.what);
-    let events = mission.log.events.iter().filter(is_own);
+        let own = marks.entry(event.what).or_default();
+        own.push((id, mission.span.part(event.time), mark));
+    }
+    marks
+}
+
+/// The times of the nodes in a box; none for a box of topics.
+fn presence(item: &Item, mission: &Mission, marks: &NodeMarks) -> Presence {
+    let nodes = || item.members.iter().filter(|what| what.is_node());
+    let lives = nodes().flat_map(|what| mission.elements.seen(*what).lives.iter().copied());
+    let times = Span::joined(lives.collect(), 0);
+    let part = |at| mission.span.part(at);
+    let mut own: Vec<_> = nodes()
+        .filter_map(|what| marks.get(what))
+        .flatten()
+        .collect();
+    own.sort_by_key(|(id, ..)| *id);
     Presence {
         times: times
             .iter()
             .map(|life| (part(life.start), part(life.end)))
             .collect(),
-        marks: events.filter_map(mark).collect(),
+        marks: own.into_iter().map(|(_, at, mark)| (*at, *mark)).collect(),
     }
 }
 

@@ -4,7 +4,6 @@ use super::page::FigureSheet;
 use crate::base::geometry::{Point, Rect, Size};
 use crate::base::words;
 use crate::draw::scene::{Scene, Stroke};
-use crate::draw::strip::moved;
 use crate::draw::style::Color;
 use crate::draw::timeline::canvas::{HAIRLINE, PX_PER_MM, PaperCanvas, Type, ink};
 use crate::draw::timeline::notes::{Unbroken, flow, flow_at, sentence};
@@ -89,7 +88,7 @@ pub(crate) fn page(sheet: &FigureSheet<'_>, mut panels: Vec<StepPanel>, left_out
         let (height, graph) = draw(&mut canvas, panel, letter, corner, wide);
         let to = Point::new(graph.x * PX_PER_MM, graph.y * PX_PER_MM);
         for group in &panel.picture.groups {
-            let mut group = moved(group, 1.0, to);
+            let mut group = group.placed(1.0, to);
             group.id = format!("{letter}-{}", group.id);
             graphs.push(group);
         }

@@ -53,9 +53,7 @@ pub(crate) struct Axis {
 
 impl Axis {
     pub(crate) fn x(&self, at: Stamp) -> f64 {
-        let whole = self.span.nanos().max(1) as f64;
-        let part = (at.since(self.span.start) as f64 / whole).clamp(0.0, 1.0);
-        self.left + part * (self.right - self.left)
+        self.left + self.span.part(at) * (self.right - self.left)
     }
 
     /// The rectangle of a time, from `y` on, wide enough to be seen.

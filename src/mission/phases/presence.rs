@@ -40,6 +40,12 @@ pub(crate) struct Presence {
     spans: Vec<Span>,
 }
 
+/// Whether these times, which do not overlap, take at least half of another.
+pub(crate) fn fill(times: &[Span], time: Span) -> bool {
+    let there: i64 = times.iter().map(|s| s.shared(time).max(0)).sum();
+    there.saturating_mul(2) >= time.nanos()
+}
+
 impl Presence {
     /// Whether it exists in each of these cells.
     pub(crate) fn cells(&self, cells: &[Span]) -> Vec<bool> {
@@ -54,8 +60,7 @@ impl Presence {
 
     /// Whether it exists for at least half of this time.
     pub(crate) fn fills(&self, time: Span) -> bool {
-        let there: i64 = self.spans.iter().map(|s| s.shared(time).max(0)).sum();
-        there.saturating_mul(2) >= time.nanos()
+        fill(&self.spans, time)
     }
 
     /// Whether it counts for the names of phases: nodes, or topics if there are only topics.

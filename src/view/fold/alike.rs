@@ -10,6 +10,7 @@ use super::{Fold, ItemKey, Keys, of};
 use crate::base::name::namespace;
 use crate::base::time::Span;
 use crate::graph::{Element, Elements};
+use crate::mission::phases::fill;
 use crate::view::ItemKind;
 
 /// The nodes that move to the box of the first of those that are alike in these phases.
@@ -21,7 +22,7 @@ pub(crate) fn folds(elements: &Elements, phases: &[Span], keys: &Keys) -> Vec<Fo
         let is_inside = |key: &&ItemKey| key.kind == ItemKind::Node && namespace(&key.name) != "/";
         if let Some(key) = of(keys, what).filter(is_inside) {
             let lives = &elements.seen(what).lives;
-            let there = phases.iter().map(|phase| fills(lives, *phase)).collect();
+            let there = phases.iter().map(|phase| fill(lives, *phase)).collect();
             alike
                 .entry((namespace(&key.name), there))
                 .or_default()
@@ -39,15 +40,6 @@ pub(crate) fn folds(elements: &Elements, phases: &[Span], keys: &Keys) -> Vec<Fo
         nodes.into_iter().filter_map(fold)
     });
     folds.collect()
-}
-
-/// Whether these lives take at least half of a phase.
-fn fills(lives: &[Span], phase: Span) -> bool {
-    let inside = lives.iter().map(|life| {
-        let (start, end) = (life.start.max(phase.start), life.end.min(phase.end));
-        end.since(start).max(0)
-    });
-    inside.sum::<i64>() >= phase.nanos() / 2
 }
 
 /// The names of the nodes in a box beside its own, without those of runs of the same node.
