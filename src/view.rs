@@ -29,10 +29,10 @@ use crate::graph::{ById, Element};
 use crate::mission::Mission;
 
 pub(crate) use filtered::filtered;
-pub use fold::crowded::Crowd;
 pub use fold::namespaces::Collapsible;
 pub(crate) use fold::namespaces::headlines;
 pub use fold::rows::CardRow;
+pub(crate) use frames::{Words, joined};
 pub use frames::{Frame, Headline, Phrase};
 pub(crate) use listed::{DrawnPart, drawn_part};
 pub use marked::Lasting;
@@ -56,8 +56,6 @@ pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
     let is_still = options.is_still.unwrap_or(view.frames.len() == 1);
     if is_still && !view.compares {
         view = still::still(view, mission);
-    } else if options.is_picture {
-        fold::crowded::gather(&mut view, mission);
     }
     (view, notices)
 }
@@ -395,20 +393,17 @@ impl View {
 
     /// The items and arrows visible in window `k`; none past the last one.
     pub fn seen(&self, k: usize) -> SeenWindow {
-        let of = |all: &[Looks]| {
-            let there = all.iter().filter_map(|one| one.at(k));
-            there.cloned().collect()
-        };
+        let of = |all: &[Looks]| all.iter().filter_map(|one| self.seen_at(one, k)).collect();
         SeenWindow {
             items: of(&self.items_shown),
             arrows: of(&self.arrows_shown),
         }
     }
 
-    /// The look of an element in window `k` as drawn, without a colour if the frame of a crowd has it.
-    pub(crate) fn calm_at(&self, shown: &Looks, k: usize) -> Option<Shown> {
-        let mut shown = shown.at(k)?.clone();
-        self.frames.get(k)?.calm(&mut shown);
+    /// The look of an element in window `k`.
+    pub(crate) fn seen_at(&self, looks: &Looks, k: usize) -> Option<Shown> {
+        let mut shown = looks.at(k)?.clone();
+        shown.is_one_of_many = self.frames.get(k)?.is_one_of_many(&shown.events);
         Some(shown)
     }
 

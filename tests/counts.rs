@@ -123,7 +123,7 @@ fn every_frame_has_the_counts_of_the_data() {
 fn frame(svg: &str, shown: &BTreeSet<u64>, at: &str) {
     let named: BTreeSet<u64> = groups(svg, "headline").flatten().collect();
     assert_eq!(named, *shown, "headline of {at}");
-    let marks = ["node", "topic", "edge", "also", "crowd"].into_iter();
+    let marks = ["node", "topic", "edge", "also"].into_iter();
     let marked: BTreeSet<u64> = marks
         .flat_map(|class| groups(svg, class))
         .flatten()

@@ -109,7 +109,7 @@ fn a_crash_is_drawn_before_during_and_after() {
     assert_eq!(of(28), said(Some(Mark::Restarted), back, "/robot1 · 4:41"));
     // If both ends are in one window, it is a restart there.
     let minutes = example("warehouse.bag", Some("60"));
-    let words = minutes.frames[4].fitting(|_| true);
+    let words = minutes.frames[4].words(usize::MAX);
     assert!(
         words.contains("object_detector restarts after 15.6 s"),
         "{words}"

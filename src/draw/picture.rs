@@ -33,7 +33,7 @@ use self::measured::MeasuredGraph;
 use self::page::{GraphFit, PageFrame, Strip};
 use self::title::Title;
 pub use self::union::{Union, UnionElement, rate_label, sign};
-use crate::base::geometry::{Point, Rect, Size};
+use crate::base::geometry::{Point, Size};
 use crate::draw::scene::{Group, Scene};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
@@ -295,7 +295,7 @@ impl<'a> Picture<'a> {
         let Some(frame) = measured.view.frames.get(k) else {
             return scene;
         };
-        self.graph((k, frame), &measured.view.calm(k), &mut scene.groups);
+        self.graph((k, frame), &measured.view.seen(k), &mut scene.groups);
         if !measured.options.bare {
             self.decorations(k, frame, &mut scene.groups);
         }
@@ -365,17 +365,6 @@ impl<'a> Picture<'a> {
             titles.extend(member_list.filter(|member_list| !member_list.pieces.is_empty()));
             groups.push(space);
         }
-        let whole = Rect::new(0.0, 0.0, self.layout.size.w, self.layout.size.h);
-        let mut numbers = Vec::new();
-        for (nth, crowd) in frame.crowds.iter().enumerate() {
-            let space = crowd.space.and_then(|at| self.layout.clusters.get(at));
-            let name = crowd.space.map_or("", |at| &*view.namespaces[at].name);
-            let before = frame.crowds[..nth].iter();
-            let others = before.filter(|other| other.space == crowd.space);
-            let [frame, words] = boxes.crowd(crowd, (name, *space.unwrap_or(&whole)), others);
-            groups.push(frame);
-            numbers.push(words);
-        }
         for (footer, also) in self.measured.graph.footers.iter().zip(&view.also) {
             let place = match footer.cluster {
                 Some(at) => self.layout.clusters.get(at),
@@ -401,7 +390,6 @@ impl<'a> Picture<'a> {
             groups.push(drawn);
             groups.extend(boxes.card_rows(card, view, k));
         }
-        groups.extend(numbers);
     }
 
     fn boxes(&self) -> Boxes<'_> {

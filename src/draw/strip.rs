@@ -13,7 +13,7 @@ use crate::draw::text::{Fonts, Weight};
 use crate::draw::timeline::canvas::PX_PER_MM;
 use crate::layout::{self, Engine, Layout};
 use crate::mission::Mission;
-use crate::view::View;
+use crate::view::{View, Words, joined};
 pub use choice::Choice;
 
 /// The smallest legible text on paper, in points.
@@ -267,11 +267,12 @@ impl<'a> StripSource<'a> {
         if let Some(phase) = self.picture.phase(window) {
             times = format!("{times} {phase}");
         }
-        let fits =
-            |text: &str| self.fonts.width(text, page.caption, Weight::Regular) <= page.panel.w;
+        let fits = |words: &[Words]| {
+            self.fonts.width(&joined(words), page.caption, Weight::Regular) <= page.panel.w
+        };
         let lines = [
             (times, Weight::SemiBold),
-            (frame.fitting(fits), Weight::Regular),
+            (joined(&frame.fitting(fits)), Weight::Regular),
         ];
         for (row, (words, weight)) in (1_u8..).zip(lines) {
             let most = page.panel.w;

@@ -98,15 +98,6 @@ impl Style {
             dash: self.declared.dash.clone(),
         }
     }
-
-    /// The look of an element that ended in a crowd: the dashes of removed elements, without their colour.
-    pub(crate) fn gone(&self) -> Quiet {
-        Quiet {
-            fill: Color::NONE,
-            dash: self.removed.dash.clone(),
-            ..self.silent.clone()
-        }
-    }
 }
 
 impl Body {

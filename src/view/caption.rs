@@ -19,6 +19,9 @@ const LONGEST_NAME: usize = 48;
 /// The most names in the line below the headline, which also has a place and a time.
 const MOST_NAMED: usize = 3;
 
+/// The words after what left in an earlier window.
+pub(super) const STILL_AWAY: &str = "still away";
+
 /// The kinds of events that the log combines if several happen at once.
 const CROWDED: [Kind; 4] = [Kind::Appeared, Kind::Vanished, Kind::Silent, Kind::Rate];
 
@@ -192,7 +195,7 @@ impl<'a> CaptionWriter<'a> {
     fn lasting(&self, lasting: &Lasting) -> Said {
         let name = self.name(lasting.what);
         match lasting.ended {
-            None => Said::new(12, ' ', name, "still away"),
+            None => Said::new(12, ' ', name, STILL_AWAY),
             Some(end) => {
                 let away = words::duration(end.since(lasting.since));
                 Said::new(6, ' ', name, &format!("back after {away}"))
@@ -458,7 +461,7 @@ fn without_transport(name: &str) -> &str {
 mod tests {
     use super::*;
     use crate::view::testing::mission;
-    use crate::view::{Frame, Mark, ViewOptions, view};
+    use crate::view::{Frame, Mark, ViewOptions, joined, view};
 
     fn last(windows: &[&str]) -> Frame {
         let (view, _) = view(&mission(windows), &ViewOptions::default());
@@ -529,10 +532,11 @@ mod tests {
             frame.words(3),
             "− /m stops; + /b, /c, /d, +1 start; + /e appears; +5"
         );
-        assert!(frame.fitting(|_| true).contains("/k 1 → 5 Hz"));
-        let short = frame.fitting(|text| text.chars().count() < 40);
+        assert!(joined(&frame.fitting(|_| true)).contains("/k 1 → 5 Hz"));
+        let fitting = |most| joined(&frame.fitting(|words| joined(words).chars().count() < most));
+        let short = fitting(40);
         assert_eq!(short, "− /m stops; + /b, /c, /d, +1 start; +6");
-        assert_eq!(frame.fitting(|_| false), "− /m stops; +10");
+        assert_eq!(fitting(0), "− /m stops; +10");
     }
 
     #[test]

@@ -7,7 +7,6 @@
 //! the drawn boxes: `rows` (topics as rows of boxes) and `crowded` (changes as one coloured frame).
 
 pub(crate) mod alike;
-pub(crate) mod crowded;
 pub(crate) mod equal;
 pub(crate) mod namespaces;
 pub(crate) mod roles;

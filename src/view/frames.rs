@@ -1,13 +1,13 @@
 //! The windows of the picture one after the other, each with its events, their numbers and the words of its headline.
 
-use super::caption::CaptionWriter;
+use super::caption::{CaptionWriter, STILL_AWAY};
 use super::items::Viewed;
 use super::listed::beginning;
 use super::marked::{LastingEvents, WindowChanges, WindowMarks};
 use super::shown::{Looks, LooksWriter};
 use super::state::{Alive, Lifetimes, LivingItems, Now};
 use super::steady::{Lengths, stable};
-use super::{ArrowId, Counts, Crowd, ItemId, Lasting, Mark, MemberState, Shown, ViewOptions};
+use super::{ArrowId, Counts, ItemId, Lasting, Mark, MemberState, Shown, ViewOptions};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{ById, Element, Id};
 use crate::mission::event_log::{EventId, Kind, Parts};
@@ -48,6 +48,7 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed<'
             ..Frame::empty(window.index, window.span)
         };
         writer.write(&mut frame);
+        frame.many = many(&frame.caption);
         list.push(frame);
     }
     join_empty(&mut list);
@@ -57,6 +58,31 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed<'
         items: windows.items.finish(&lengths),
         arrows: windows.arrows.finish(&lengths),
     }
+}
+
+/// The most changes of a window that have a glow and a badge: of more, these would no longer say where to look.
+const MOST_GLOWING: usize = 5;
+
+/// The events of the phrases that have too many names. If four nodes stop and three start, those that start do without a
+/// glow: they are still visible in the next window.
+fn many(caption: &[Phrase]) -> Vec<EventId> {
+    let mut glowing: Vec<&Phrase> = caption.iter().collect();
+    let mut many = Vec::new();
+    loop {
+        let all: usize = glowing.iter().map(|phrase| phrase.names.len()).sum();
+        let next = (0..glowing.len()).max_by_key(|at| {
+            let (sign, names) = (glowing[*at].sign, glowing[*at].names.len());
+            (sign == '+' && all - names <= MOST_GLOWING, names)
+        });
+        match next {
+            Some(next) if all > MOST_GLOWING => {
+                many.extend(glowing.remove(next).events.iter().flatten());
+            }
+            _ => break,
+        }
+    }
+    many.sort_unstable();
+    many
 }
 
 /// The most consecutive windows without a message that are separate frames: more would only
@@ -366,8 +392,8 @@ pub struct Frame {
     pub counts: Counts,
     /// The changes in words, the most important first; empty exactly if nothing is marked.
     pub caption: Vec<Phrase>,
-    /// The changes that are combined into one coloured frame, because there are too many.
-    pub crowds: Vec<Crowd>,
+    /// The events with a colour, but without glow and badge, because there are too many: sorted indices in the event log.
+    pub many: Vec<EventId>,
     /// The long time without messages and changes that it lies in, which is one frame of an animation.
     pub empty: Option<Span>,
     /// The line below: namespace, exact times and consequences of the changes, or the time of the last
@@ -383,6 +409,12 @@ impl Frame {
             span,
             ..Self::default()
         }
+    }
+
+    /// Whether all of these events are some of [`Frame::many`].
+    pub(crate) fn is_one_of_many(&self, events: &[EventId]) -> bool {
+        let is_of_many = |event| self.many.binary_search(event).is_ok();
+        !events.is_empty() && events.iter().all(is_of_many)
     }
 
     /// Whether an event begins or ends in it.
@@ -403,12 +435,12 @@ impl Frame {
 
     /// The caption in at most `most` phrases of three names each, the rest counted: `− a stops; + b starts; +3`.
     pub fn words(&self, most: usize) -> String {
-        self.shortened(most, 3)
+        joined(&self.shortened(most, 3))
     }
 
     /// The caption with as many names as fit, at most 40 of each kind, and as many phrases as possible; the
     /// shortest form if none fits.
-    pub fn fitting(&self, fits: impl Fn(&str) -> bool) -> String {
+    pub(crate) fn fitting(&self, fits: impl Fn(&[Words]) -> bool) -> Vec<Words> {
         let longest = self.caption.iter().map(|p| p.names.len()).max();
         let longest = longest.unwrap_or(1).min(40);
         let mut best = (0, self.shortened(1, 1));
@@ -419,9 +451,9 @@ impl Frame {
                 if reported <= best.0 {
                     break;
                 }
-                let text = self.shortened(phrases, names);
-                if fits(&text) {
-                    best = (reported, text);
+                let words = self.shortened(phrases, names);
+                if fits(&words) {
+                    best = (reported, words);
                     break;
                 }
             }
@@ -429,16 +461,39 @@ impl Frame {
         best.1
     }
 
-    fn shortened(&self, phrases: usize, names: usize) -> String {
-        let reported = self.caption.iter().take(phrases).map(|p| p.text(names));
-        let mut reported: Vec<String> = reported.collect();
+    fn shortened(&self, phrases: usize, names: usize) -> Vec<Words> {
+        let reported = self.caption.iter().take(phrases).map(|phrase| Words {
+            sign: match phrase.sign {
+                _ if phrase.names.is_empty() => None,
+                _ if phrase.tail == STILL_AWAY => Some('−'),
+                sign => Some(sign),
+            },
+            text: phrase.text(names),
+        });
+        let mut reported: Vec<Words> = reported.collect();
         let rest = self.caption.iter().skip(phrases).map(|p| p.names.len());
         let rest: usize = rest.sum();
         if rest > 0 {
-            reported.push(format!("+{rest}"));
+            let text = format!("+{rest}");
+            reported.push(Words { sign: None, text });
         }
-        reported.join("; ")
+        reported
     }
+}
+
+/// A phrase of a headline as it is written, or the number of those that are not: `+3`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Words {
+    /// That of its [`Phrase`], `−` for what is away; none for words that are no change.
+    pub sign: Option<char>,
+    /// What is written.
+    pub text: String,
+}
+
+/// A headline in one line.
+pub(crate) fn joined(words: &[Words]) -> String {
+    let texts: Vec<&str> = words.iter().map(|words| &*words.text).collect();
+    texts.join("; ")
 }
 
 impl Counts {

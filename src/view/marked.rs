@@ -233,7 +233,7 @@ fn weight(mark: Mark) -> u8 {
         Mark::Paused => 3,
         Mark::Changed => 2,
         Mark::Inside | Mark::Away => 1,
-        Mark::Faster | Mark::Slower | Mark::Added | Mark::Gone => 0,
+        Mark::Faster | Mark::Slower | Mark::Added => 0,
     }
 }
 

@@ -23,7 +23,7 @@ impl View {
     pub(crate) fn news(&self, k: usize) -> Option<News> {
         let frame = self.frames.get(k)?;
         let seen = self.seen(k);
-        let is_new = |shown: &Shown| shown.mark.is_some_and(super::Mark::has_color);
+        let is_new = |shown: &Shown| shown.mark.is_some();
         let mut changes = ById::like(&self.items, false);
         for shown in seen.items.iter().filter(|shown| is_new(shown)) {
             changes[shown.item()] = true;
@@ -65,10 +65,7 @@ impl View {
             arrows: arrows.collect(),
             items_shown: alone(items.iter().copied()),
             arrows_shown: alone(lines.iter().copied()),
-            frames: vec![super::Frame {
-                crowds: Vec::new(),
-                ..frame.clone()
-            }],
+            frames: vec![frame.clone()],
             ..Self::default()
         };
         Some(News {

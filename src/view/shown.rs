@@ -41,8 +41,6 @@ pub enum Mark {
     Inside,
     /// It is a node that left in an earlier window and returns in a later one.
     Away,
-    /// It ended with others, as their common coloured frame shows.
-    Gone,
 }
 
 impl Mark {
@@ -59,7 +57,6 @@ impl Mark {
             Self::Changed => "changed",
             Self::Inside => "inside",
             Self::Away => "away",
-            Self::Gone => "gone",
         }
     }
 
@@ -72,18 +69,12 @@ impl Mark {
         }
     }
 
-    /// Whether it has its own colour.
-    pub(crate) fn has_color(self) -> bool {
-        self != Self::Gone
-    }
-
-    /// The class in SVG: `added`, `removed`, `away`, `gone` or `changed`.
+    /// The class in SVG: `added`, `removed`, `away` or `changed`.
     pub fn class(self) -> &'static str {
         match self {
             Self::Added => "added",
             Self::Removed => "removed",
             Self::Away => "away",
-            Self::Gone => "gone",
             _ => "changed",
         }
     }
@@ -114,6 +105,8 @@ pub struct Shown {
     pub is_paused: bool,
     /// Whether the subscriber receives nothing because the qualities of service are incompatible.
     pub is_starved: bool,
+    /// Whether its change is one of so many in the window that it has only a colour, without glow and badge.
+    pub is_one_of_many: bool,
     /// The headlines behind `mark`, sorted: indices in the event log.
     pub events: Vec<EventId>,
     /// The topics that a bundle carries, sorted by index; empty for everything else.
@@ -206,9 +199,14 @@ impl Shown {
         cast::to_u8(libm::round(decades * 2.0).clamp(0.0, f64::from(STEPS)))
     }
 
+    /// The mark that its badge shows, if it has one.
+    pub(crate) fn badge(&self) -> Option<Mark> {
+        self.mark.filter(|_| !self.is_one_of_many)
+    }
+
     /// Whether it ended in the window.
     pub(crate) fn is_ghost(&self) -> bool {
-        matches!(self.mark, Some(Mark::Removed | Mark::Gone))
+        self.mark == Some(Mark::Removed)
     }
 
     /// Makes it the look of a service, whose lack of messages does not mean silence.

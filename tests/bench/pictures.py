@@ -143,7 +143,7 @@ def frame(root, sums):
         elif kind == "namespace-title":
             titles += [box(text) for text in texts]
         if {"added", "removed", "changed", "away"} & set(words):
-            coloured |= set((group.get("data-entries") or "").split()) if kind != "crowd" else {group.get("data-entries")}
+            coloured |= set((group.get("data-entries") or "").split())
     pairs = collections.Counter(line["pair"] for line in lines.values())
     sums["lines"] += len(lines)
     sums["crossings"] += crossings(list(lines.values()))

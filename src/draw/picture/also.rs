@@ -159,10 +159,8 @@ impl Boxes<'_> {
         let inset = if footer.cluster.is_some() { INSET } else { 0.0 };
         let seen = also.items.iter().zip(&also.shown).zip(&footer.names);
         let seen =
-            seen.filter_map(|((item, shown), name)| Some((item, view.calm_at(shown, k)?, name)));
-        let seen: Vec<_> = seen
-            .filter(|(_, shown, _)| shown.mark != Some(Mark::Gone))
-            .collect();
+            seen.filter_map(|((item, shown), name)| Some((item, view.seen_at(shown, k)?, name)));
+        let seen: Vec<_> = seen.collect();
         let listed = listed(&seen, |(_, shown, _)| shown.mark.is_some());
         let texts = listed.iter().map(|at| {
             let (item, shown, short) = &seen[*at];

@@ -263,7 +263,7 @@ impl Arrows<'_> {
         {
             self.label(&mut over, &text, is_badge, track, shown, &look);
         }
-        if let Some(mark) = shown.mark.filter(|mark| is_badged(*mark, ends)) {
+        if let Some(mark) = shown.badge().filter(|mark| is_badged(*mark, ends)) {
             let size = self.fit.pen * 0.8;
             badge::badge(&mut over, self.style, mark, track.badge, size);
         }
@@ -354,7 +354,7 @@ impl Arrows<'_> {
         let is_upright = place.side != Anchor::Middle;
         let is_forward = track.is_forward(is_upright);
         for (row, at) in rows.iter().zip(0_u32..) {
-            let mark = row.mark.or(shown.mark).filter(|mark| mark.has_color());
+            let mark = row.mark.or(shown.mark);
             let color = match row.mark {
                 Some(mark) => options::change(self.style, mark).color,
                 None if mark.is_some() => look.stroke.color,

@@ -10,8 +10,8 @@ use crate::view::Mark;
 
 /// Draws the badge of `mark` around `centre`, `scale` times its size in the style.
 pub(crate) fn badge(group: &mut Group, style: &Style, mark: Mark, centre: Point, scale: f64) {
-    // Its text shows how long it has been away; for a crowd, the common frame shows the end.
-    if matches!(mark, Mark::Away | Mark::Gone) {
+    // Its text shows how long it has been away.
+    if mark == Mark::Away {
         return;
     }
     let radius = style.badge.radius * scale;
@@ -99,7 +99,7 @@ fn sign(group: &mut Group, color: Color, mark: Mark, centre: Point, r: f64) {
                 color,
             ));
         }
-        Mark::Away | Mark::Gone | Mark::Inside => {
+        Mark::Away | Mark::Inside => {
             group.shape(Shape::filled(
                 Form::Ellipse(Rect::around(centre, Size::new(1.1 * r, 1.1 * r))),
                 color,

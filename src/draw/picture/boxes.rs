@@ -11,7 +11,7 @@ use crate::draw::scene::{Anchor, Form, Group, Piece, Shape, Stroke, Text, polygo
 use crate::draw::style::{Body, Color, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::graph::State;
-use crate::view::{Crowd, Item, ItemKind, Mark, Shown};
+use crate::view::{Item, ItemKind, Mark, Shown};
 
 /// The dashes of an empty namespace.
 const EMPTY: [f64; 2] = [1.0, 4.0];
@@ -90,55 +90,6 @@ impl Boxes<'_> {
         group
     }
 
-    /// The coloured frame of a crowd around a namespace or the whole graph, and the number on it, to the left
-    /// of those of `others`, which share the frame.
-    pub(crate) fn crowd<'a>(
-        &self,
-        crowd: &Crowd,
-        (name, place): (&str, Rect),
-        others: impl Iterator<Item = &'a Crowd>,
-    ) -> [Group; 2] {
-        let (style, pen) = (self.style, self.fit.pen);
-        let change = options::change(style, crowd.mark);
-        // That of the whole graph is outside of all boxes.
-        let beyond = if crowd.space.is_none() {
-            4.0 * pen
-        } else {
-            0.0
-        };
-        let place = self.fit.rect(place).grown(beyond);
-        let events: Vec<String> = crowd.events.iter().map(ToString::to_string).collect();
-        let group = |part: &str| Group {
-            id: format!("crowd{part}{}{}", crowd.mark.word(), super::encoded(name)),
-            class: format!("crowd {}", crowd.mark.class()),
-            data: vec![("name", name.to_owned()), ("entries", events.join(" "))],
-            title: format!("{name} {}", crowd.words).trim_start().to_owned(),
-            ..Group::default()
-        };
-        let (mut frame, mut words) = (group(""), group("-words-"));
-        frame.shape(Shape {
-            form: Form::Rect(place, style.cluster.radius * self.fit.scale),
-            fill: Color::NONE,
-            stroke: Stroke::dashed(change.color, change.width * pen, &change.dash),
-        });
-        let size = style.cluster.size * self.fit.scale;
-        let width = |crowd: &Crowd| badge::label_width(self.fonts, &crowd.words, size);
-        let taken: f64 = others.map(|other| width(other) + size * 0.5).sum();
-        let centre = Point::new(
-            place.right() - width(crowd) / 2.0 - size - taken,
-            place.y - beyond * 0.75,
-        );
-        badge::label(
-            &mut words,
-            self.fonts,
-            (change.color, style.badge.sign),
-            &crowd.words,
-            centre,
-            size,
-        );
-        [frame, words]
-    }
-
     /// Takes the title out of a namespace's box, to be painted over the lines that cross it, and moves it.
     pub(crate) fn title_of(&self, space: &mut Group, by: Point) -> Group {
         let mut title = Group {
@@ -193,7 +144,7 @@ impl Boxes<'_> {
             let paint = (look.stroke.color, style.badge.sign);
             badge::label(&mut group, self.fonts, paint, &text, below, size);
         }
-        if let Some(mark) = shown.mark {
+        if let Some(mark) = shown.badge() {
             badge::badge(&mut group, style, mark, card.badge, self.fit.pen);
         }
         group

@@ -178,7 +178,7 @@ impl Boxes<'_> {
     ) -> Option<Group> {
         let seen = line.topics.iter().filter_map(|(at, _)| {
             let row = &view.rows[*at];
-            Some((row, view.calm_at(&row.shown, k)?))
+            Some((row, view.seen_at(&row.shown, k)?))
         });
         let seen: Vec<(&CardRow, Shown)> = seen.collect();
         let (row, shown) = seen.first()?;
@@ -199,8 +199,8 @@ impl Boxes<'_> {
         let middle = place.centre().y;
         // The colour of the whole card already shows it.
         let owner = view.items_shown.get(row.owner);
-        let owner = owner.and_then(|shown| view.calm_at(shown, k)?.mark);
-        let is_new = |mark: &Mark| mark.has_color() && owner.map(Mark::class) != Some(mark.class());
+        let owner = owner.and_then(|shown| view.seen_at(shown, k)?.mark);
+        let is_new = |mark: &Mark| owner.map(Mark::class) != Some(mark.class());
         if let Some(mark) = shown.mark.filter(is_new) {
             let inset = style.added.width / 2.0 * self.fit.pen;
             let inside = Rect::new(place.x + inset, place.y, place.w - 2.0 * inset, place.h);
@@ -209,10 +209,12 @@ impl Boxes<'_> {
                 options::change(style, mark).fill,
             ));
             let at = Point::new(place.x, middle);
-            badge::badge(&mut group, style, mark, at, self.fit.pen * BADGE);
+            if !shown.is_one_of_many {
+                badge::badge(&mut group, style, mark, at, self.fit.pen * BADGE);
+            }
         }
         let (weight, quiet) = look.small;
-        let is_there = |at: usize| view.calm_at(&view.rows[at].shown, k).is_some();
+        let is_there = |at: usize| view.seen_at(&view.rows[at].shown, k).is_some();
         let left = Point::new(place.x + PAD * size, middle);
         let (font, words) = ((size, weight), line.words(is_there));
         group.text(Text::centred(Anchor::Start, left, font, look.text, words));

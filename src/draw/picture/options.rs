@@ -39,12 +39,12 @@ pub(crate) fn change(style: &Style, mark: Mark) -> &Change {
     }
 }
 
-/// The paint of an element that is away, or ended in a crowd.
-fn absent(style: &Style, shown: &Shown) -> Option<Quiet> {
-    match shown.mark {
-        Some(Mark::Away) => Some(style.away()),
-        Some(Mark::Gone) => Some(style.gone()),
-        _ => None,
+/// The glow of a change, which would show nothing around each of many.
+fn glow(change: &Change, shown: &Shown) -> Color {
+    if shown.is_one_of_many {
+        Color::NONE
+    } else {
+        change.glow
     }
 }
 
@@ -58,8 +58,8 @@ pub(crate) fn body(style: &Style, kind: ItemKind) -> &Body {
 
 /// The paint of a box.
 pub(crate) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
-    if let Some(quiet) = absent(style, shown) {
-        return quiet_box(&quiet);
+    if shown.mark == Some(Mark::Away) {
+        return quiet_box(&style.away());
     }
     if let Some(mark) = shown.mark {
         let change = change(style, mark);
@@ -68,7 +68,7 @@ pub(crate) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
             stroke: line(change.color, change.width, &change.dash),
             text: change.text,
             small: (Weight::SemiBold, change.color),
-            glow: change.glow,
+            glow: glow(change, shown),
         };
     }
     let quiet = match (shown.state, shown.confidence) {
@@ -111,8 +111,8 @@ pub(crate) fn of_arrow(
 ) -> ArrowLook {
     let edge = &style.edge;
     let latched = shown.state == State::Latched;
-    if let Some(quiet) = absent(style, shown) {
-        return quiet_arrow(&quiet);
+    if shown.mark == Some(Mark::Away) {
+        return quiet_arrow(&style.away());
     }
     if let Some(mark) = shown.mark {
         let change = change(style, mark);
@@ -125,7 +125,7 @@ pub(crate) fn of_arrow(
             stroke: line(change.color, width, &change.dash),
             text: change.text,
             dot: latched,
-            glow: change.glow,
+            glow: glow(change, shown),
         };
     }
     let quiet = match (shown.state, shown.confidence) {

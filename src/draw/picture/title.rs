@@ -7,7 +7,7 @@ use crate::base::words;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Stroke, Text, line};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
-use crate::view::{Frame, View};
+use crate::view::{Frame, View, Words, joined};
 
 /// The usual width of a character, as a share of the size of the text.
 const USUAL_WIDTH: f64 = 0.5;
@@ -17,6 +17,10 @@ const GAP: f64 = 24.0;
 const MOST_RIGHT: f64 = 0.45;
 /// The lines of text, as fractions of the bar's height.
 const LINES: (f64, f64) = (0.46, 0.82);
+/// Those of a headline of two lines.
+const TWO_LINES: (f64, f64) = (0.41, 0.8);
+/// What separates the parts of the line below the headline.
+const NOTES: &str = " · ";
 
 /// The bar on top of every frame.
 pub(crate) struct Title<'a> {
@@ -57,7 +61,8 @@ impl<'a> Title<'a> {
         group
     }
 
-    /// The headline with the line below it, and the window's time, bag and date on the right.
+    /// The headline with the line below it, and the window's time, bag and date on the right. A headline that does not
+    /// fit into one line takes both.
     pub(crate) fn words(&self, frame: &Frame, phase: &str) -> Vec<Group> {
         let (clock, room) = self.clock(frame);
         let mut headline = Group::named("headline");
@@ -65,60 +70,108 @@ impl<'a> Title<'a> {
         let mut note = Group::named("note");
         let (style, unit) = (&self.style.title, self.page.unit);
         let (size, small) = (style.size * unit, style.quiet_size * unit);
-        let mut below = vec![phase];
         let empty = frame.empty.map_or_else(String::new, |time| {
             format!("{} without a message", words::duration(time.nanos()))
         });
-        let fits = |text: &str, size: f64| {
-            self.width(&self.fonts.shown(text), size, Weight::SemiBold) <= room.0
-        };
-        // All words at a slightly smaller size are better than some of them.
-        let whole = |text: &str| {
-            let mut sizes = SMALLER.map(|part| size * part).into_iter();
-            sizes.find(|size| fits(text, *size)).unwrap_or(size)
-        };
+        let mut below = vec![phase.to_owned()];
+        let mut second = Point::new(self.left(), LINES.1);
+        let mut rest = room.1;
         if frame.caption.is_empty() {
-            let main = match frame.empty {
-                Some(_) => &empty,
-                None => &frame.note,
+            let mut sizes = SMALLER.map(|part| size * part).into_iter();
+            let (main, other) = match frame.empty {
+                Some(_) => (&empty, Some(&frame.note)),
+                None => (&frame.note, None),
             };
-            below.extend(frame.empty.map(|_| &*frame.note));
-            let size = whole(main);
-            let text = self.cut(main, size, Weight::Regular, room.0);
-            note.text(self.text(text, LINES.0, (size, Weight::Regular), style.quiet));
+            below.extend(other.cloned());
+            let fits = |size: &f64| self.width(main, *size, Weight::Regular) <= room.0;
+            let font = (sizes.find(fits).unwrap_or(size), Weight::Regular);
+            let text = self.cut(main, font.0, font.1, room.0);
+            let at = Point::new(self.left(), LINES.0);
+            note.text(self.text(text, at, font, style.quiet));
         } else {
-            headline.title = frame.fitting(|_| true);
-            let size = whole(&headline.title);
-            let text = frame.fitting(|text| fits(text, size));
-            let text = self.cut(&text, size, Weight::SemiBold, room.0);
-            headline.text(self.text(text, LINES.0, (size, Weight::SemiBold), self.color(frame)));
-            below.extend([&*frame.note, &empty]);
+            headline.title = joined(&frame.fitting(|_| true));
+            let told = self.told(frame, room, size);
+            let mut first = Point::new(self.left(), LINES.0);
+            if told.lines.len() > 1 {
+                (first.y, second.y) = TWO_LINES;
+            }
+            let ats = [&mut first, &mut second];
+            for (line, at) in told.lines.iter().zip(ats) {
+                let from = at.x;
+                self.line(&mut headline, line, at, told.size);
+                if told.lines.len() > 1 {
+                    rest = room.1 - (at.x - from);
+                }
+            }
+            below.extend(frame.note.split(NOTES).map(str::to_owned));
+            below.push(empty);
         }
         if frame.messages == 0 && frame.empty.is_none() && !self.view.compares {
-            below.push("no messages");
+            below.push("no messages".to_owned());
         }
         below.retain(|part| !part.is_empty());
-        let text = self.cut(&below.join(" · "), small, Weight::Regular, room.1);
+        // Behind words there is room for whole parts only.
+        let is_behind = second.x > self.left();
+        let gap = if is_behind { small } else { 0.0 };
+        let fits = |below: &[String]| {
+            self.width(&below.join(NOTES), small, Weight::Regular) + gap <= rest
+        };
+        while is_behind && !below.is_empty() && !fits(&below) {
+            below.pop();
+        }
+        let text = self.cut(&below.join(NOTES), small, Weight::Regular, rest);
         if !text.is_empty() {
-            note.text(self.text(text, LINES.1, (small, Weight::Regular), style.quiet));
+            second.x += gap;
+            note.text(self.text(text, second, (small, Weight::Regular), style.quiet));
         }
         vec![headline, note, clock]
     }
 
-    /// The colour of the most important changes in the headline: ends before beginnings, and these before
-    /// other changes.
-    fn color(&self, frame: &Frame) -> Color {
+    /// The headline in as many words as fit, in one line or in two.
+    fn told(&self, frame: &Frame, room: (f64, f64), size: f64) -> Told {
+        let wide = |words: &[Words], size: f64| self.width(&joined(words), size, Weight::SemiBold);
+        let all = frame.fitting(|_| true);
+        // All words at a slightly smaller size are better than some of them.
+        let mut sizes = SMALLER.map(|part| size * part).into_iter();
+        if let Some(size) = sizes.find(|size| wide(&all, *size) <= room.0) {
+            let lines = vec![all];
+            return Told { lines, size };
+        }
+        let size = size * SMALLEST;
+        let broken = |words: &[Words]| {
+            let first = (1..words.len()).rev();
+            let mut first = first.filter(|at| wide(&words[..*at], size) <= room.0);
+            let at = first.next()?;
+            (wide(&words[at..], size) <= room.1).then_some(at)
+        };
+        let words = frame.fitting(|words| wide(words, size) <= room.0 || broken(words).is_some());
+        let lines = match broken(&words) {
+            Some(at) if wide(&words, size) > room.0 => {
+                vec![words[..at].to_vec(), words[at..].to_vec()]
+            }
+            _ => vec![words],
+        };
+        Told { lines, size }
+    }
+
+    /// Writes a line of the headline from `at` on, each of its words in the colour of their change, and moves `at` to its
+    /// end.
+    fn line(&self, headline: &mut Group, line: &[Words], at: &mut Point, size: f64) {
         let style = &self.style.title;
-        let is_away = frame.lasting.iter().any(|l| l.ended.is_none());
-        let is_still = frame.caption.iter().all(|p| p.names.is_empty());
-        let has = |sign| frame.caption.iter().any(|p| p.sign == sign);
-        match (has('−'), has('+')) {
-            (true, true) => style.text,
-            (true, false) => style.removed,
-            (false, true) => style.added,
-            (false, false) if is_away => style.removed,
-            (false, false) if is_still => style.text,
-            (false, false) => style.changed,
+        let most = self.page.title.right() - self.left() - at.x;
+        for (k, words) in line.iter().enumerate() {
+            let end = if k + 1 < line.len() { "; " } else { "" };
+            let color = match words.sign {
+                Some('+') => style.added,
+                Some('−') => style.removed,
+                Some(_) => style.changed,
+                None => style.text,
+            };
+            let text = format!("{}{end}", words.text);
+            let text = self.cut(&text, size, Weight::SemiBold, most);
+            let wide = self.fonts.width(&text, size, Weight::SemiBold);
+            headline.text(self.text(text, *at, (size, Weight::SemiBold), color));
+            at.x += wide;
         }
     }
 
@@ -165,8 +218,9 @@ impl<'a> Title<'a> {
             anchor: Anchor::End,
             ..text
         };
-        let time = self.text(time, LINES.0, (size, Weight::SemiBold), style.text);
-        let below = self.text(below, LINES.1, (small, Weight::Regular), style.quiet);
+        let at = |part| Point::new(self.left(), part);
+        let time = self.text(time, at(LINES.0), (size, Weight::SemiBold), style.text);
+        let below = self.text(below, at(LINES.1), (small, Weight::Regular), style.quiet);
         group.text(right(time));
         group.text(right(below));
         (group, room)
@@ -187,10 +241,11 @@ impl<'a> Title<'a> {
         self.fonts.fit(&text, size, weight, most).into_owned()
     }
 
-    fn text(&self, text: String, part: f64, font: (f64, Weight), color: Color) -> Text {
+    /// A text from `at` on, whose height is a part of the bar's.
+    fn text(&self, text: String, at: Point, font: (f64, Weight), color: Color) -> Text {
         let bar = self.page.title;
         Text {
-            at: Point::new(self.left(), bar.y + bar.h * part),
+            at: Point::new(at.x, bar.y + bar.h * at.y),
             anchor: Anchor::Start,
             size: font.0,
             weight: font.1,
@@ -207,8 +262,16 @@ fn events(frame: &Frame) -> String {
     ids.collect::<Vec<_>>().join(" ")
 }
 
-/// The sizes of a headline, as parts of the largest.
-const SMALLER: [f64; 4] = [1.0, 0.9, 0.8, 0.7];
+/// A headline as it is written.
+struct Told {
+    lines: Vec<Vec<Words>>,
+    size: f64,
+}
+
+/// The sizes of a headline in one line, as parts of the largest.
+const SMALLER: [f64; 3] = [1.0, 0.9, 0.8];
+/// The size of a headline in two lines: both fit into the bar, and are larger than the line below a headline.
+const SMALLEST: f64 = 0.8;
 
 /// The titles of the windows of a comparison.
 pub(crate) const SIDES: [&str; 2] = ["A alone", "B against A"];
