@@ -35,15 +35,15 @@ fn headlines(mission: &Value) -> Vec<BTreeSet<u64>> {
         .collect()
 }
 
-/// The groups of an SVG whose class begins with this word, with the events that they name.
+/// The groups of an SVG whose class begins with these words, with the events that they name.
 fn groups<'a>(svg: &'a str, class: &'a str) -> impl Iterator<Item = Vec<u64>> + 'a {
     let starts = svg
         .match_indices("<g class=\"")
         .map(|(at, _)| &svg[at + 10..]);
     let tags = starts.map(|rest| &rest[..rest.find('>').unwrap()]);
     let of_class = tags.filter(move |tag| {
-        let words = tag[..tag.find('"').unwrap()].split(' ').next();
-        words == Some(class)
+        let rest = tag[..tag.find('"').unwrap()].strip_prefix(class);
+        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
     });
     of_class.filter_map(|tag| {
         let keys = ["data-entries=\"", "data-entry=\""];
@@ -102,6 +102,7 @@ fn every_frame_has_the_counts_of_the_data() {
             let svg = text(&format!("x{index:0digits$}.svg"));
             let at = format!("{bag} by {period} s, window {index}");
             frame(&svg, shown, &at);
+            coloured(&svg, shown, &mission, &at);
             alive(&svg, &windows[index], &at);
             chart(&text(&format!("x{index:0digits$}.mmd")), shown, &at);
         }
@@ -132,6 +133,29 @@ fn frame(svg: &str, shown: &BTreeSet<u64>, at: &str) {
     assert_eq!(shown.is_empty(), svg.contains("no change"), "words of {at}");
 }
 
+/// A node that starts, stops or restarts has its colour at its own box, however many do so at once; without a line, at its
+/// words.
+fn coloured(svg: &str, shown: &BTreeSet<u64>, mission: &Value, at: &str) {
+    let places = [
+        "node added",
+        "node removed",
+        "node changed",
+        "node away",
+        "also",
+    ];
+    let nodes: BTreeSet<u64> = places
+        .iter()
+        .flat_map(|class| groups(svg, class).flatten())
+        .collect();
+    for id in shown {
+        let event = &mission["events"][usize::try_from(*id).unwrap()];
+        let is_life = ["started", "stopped", "restarted"].iter().any(|kind| event["kind"] == **kind);
+        if event["what"] == "node" && is_life {
+            assert!(nodes.contains(id), "{} of {at}", event["name"]);
+        }
+    }
+}
+
 /// A node that is drawn as active is one of the window's nodes in the data: for an anonymous one, a run of
 /// it.
 fn alive(svg: &str, window: &Value, at: &str) {
@@ -147,7 +171,7 @@ fn alive(svg: &str, window: &Value, at: &str) {
         let name = &rest[..rest.find('"').unwrap()];
         let classes: Vec<&str> = classes.split(' ').collect();
         // Unknown publishers and collapsed namespaces are boxes, not nodes.
-        let is_gone = ["removed", "gone"].iter().any(|c| classes.contains(c));
+        let is_gone = classes.contains(&"removed");
         let is_drawn = classes.contains(&"active") && !is_gone;
         if is_drawn && !name.contains(" ?") && !rest.contains(" data-members=") {
             assert!(names.iter().any(|n| is_run(n, name)), "{name} of {at}");

@@ -66,6 +66,7 @@ fn mission(windows: usize) -> (Mission, View) {
                 event: EventId(0),
                 kind: Kind::Started,
                 what: Element::Node(NodeId(0)),
+                leaves: false,
                 time: second(index),
             })
             .into_iter()

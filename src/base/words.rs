@@ -269,16 +269,25 @@ pub fn clock(nanos: i64) -> String {
     )
 }
 
-/// Date and zone of a time since 1970, in nanoseconds: `2024-05-03 UTC`.
-pub fn date(nanos: i64) -> String {
-    let time = DateTime::from_timestamp_nanos(nanos);
-    time.format("%Y-%m-%d UTC").to_string()
+/// Date and zone of a time since 1970, in nanoseconds: `2024-05-03 UTC`; `None` for a time that is not of the calendar.
+pub fn date(nanos: i64) -> Option<String> {
+    let time = of_calendar(nanos)?;
+    Some(time.format("%Y-%m-%d UTC").to_string())
 }
 
-/// Date, clock and zone of a time since 1970, in nanoseconds: `2024-05-03 14:03:22 UTC`.
-pub fn date_and_clock(nanos: i64) -> String {
-    let time = DateTime::from_timestamp_nanos(nanos);
-    time.format("%Y-%m-%d %H:%M:%S UTC").to_string()
+/// Date, clock and zone of a time since 1970, in nanoseconds: `2024-05-03 14:03:22 UTC`; `None` for a time that is not of
+/// the calendar.
+pub fn date_and_clock(nanos: i64) -> Option<String> {
+    let time = of_calendar(nanos)?;
+    Some(time.format("%Y-%m-%d %H:%M:%S UTC").to_string())
+}
+
+/// The first second of 2007, the year of the first commit of ROS: earlier times are those of simulations, or of clocks that
+/// were not set.
+const FIRST_OF_ROS: i64 = 1_167_609_600 * SECOND;
+
+fn of_calendar(nanos: i64) -> Option<DateTime<chrono::Utc>> {
+    (nanos >= FIRST_OF_ROS).then(|| DateTime::from_timestamp_nanos(nanos))
 }
 
 /// `text` in at most `most` characters, its end cut with `…`.
@@ -418,7 +427,11 @@ mod tests {
             (offset_seconds(430_900_000_000), "07:10"),
             (offset_tenths(430_190_000_000), "07:10.1"),
             (clock(50_602 * SECOND), "14:03:22"),
-            (date_and_clock(0), "1970-01-01 00:00:00 UTC"),
+            (
+                date_and_clock(FIRST_OF_ROS).unwrap(),
+                "2007-01-01 00:00:00 UTC",
+            ),
+            (date(FIRST_OF_ROS - 1).unwrap_or_default(), ""),
             (shorten("/camera/image", 8).into_owned(), "/camera…"),
             (shorten("/camera", 7).into_owned(), "/camera"),
             (some_of(&["a", "b"], 3), "a and b"),

@@ -278,9 +278,10 @@ impl HtmlPage<'_> {
             return String::new();
         };
         let whole = last.span.end.since(first.span.start) / 1_000_000 * 1_000_000;
+        let date = words::date_and_clock(first.span.start.0);
         format!(
-            "{}, {} in {}",
-            words::date_and_clock(first.span.start.0),
+            "{}{} in {}",
+            date.map_or_else(String::new, |date| date + ", "),
             words::offset(whole),
             words::count(frames.len(), "window")
         )

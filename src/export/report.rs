@@ -102,11 +102,12 @@ fn verdict(sequence: &Sequence<'_>, view: &View) -> String {
         .filter(|k| view.is_changed(*k))
         .count();
     let lengths = words::period(first.span.nanos());
+    let date = words::date_and_clock(first.span.start.0);
     format!(
-        "**{}**: {said}.\n\n{} from {}, in {} of {lengths}{}.",
+        "**{}**: {said}.\n\n{}{}, in {} of {lengths}{}.",
         plain(&title),
         words::duration(last.span.end.since(first.span.start)),
-        words::date_and_clock(first.span.start.0),
+        date.map_or_else(String::new, |date| format!(" from {date}")),
         words::count(view.frames.len(), "window"),
         if changed == 0 {
             String::new()

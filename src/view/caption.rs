@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::mem::discriminant;
 
 use super::items::Viewed;
-use super::marked::Part;
+use super::state::LivingItems;
 use super::{Frame, Headline, ItemKind, Lasting, Phrase};
 use crate::base::name::{is_quiet, namespace};
 use crate::base::time::Stamp;
@@ -61,16 +61,14 @@ impl<'a> CaptionWriter<'a> {
         }
     }
 
-    /// Puts the events of a window into words.
-    pub(crate) fn write(&mut self, frame: &mut Frame) {
+    /// Puts the events of a window into words; `after` is what lives at its end.
+    pub(crate) fn write(&mut self, frame: &mut Frame, after: &LivingItems) {
         let whats = frame.headlines.iter().map(|h| h.what);
         let whats = whats.chain(frame.lasting.iter().map(|l| l.what));
         self.home = home(whats.filter_map(|what| self.subject(what)));
         let mut groups = Groups::new();
         for headline in &frame.headlines {
-            let part = self.event(headline.event).map(|e| Part::of(e, frame.span));
-            let said = self.phrase(headline, part.unwrap_or(Part::Whole));
-            said.add(&mut groups, headline.event);
+            self.phrase(headline).add(&mut groups, headline.event);
             // Equal simultaneous events of other elements are parts of it.
             for id in self.parts.get(&headline.event).into_iter().flatten() {
                 if let Some(part) = self.event(*id)
@@ -82,10 +80,10 @@ impl<'a> CaptionWriter<'a> {
                     let other = Headline {
                         event: *id,
                         what: part.what,
+                        leaves: false,
                         ..*headline
                     };
-                    let said = self.phrase(&other, Part::Whole);
-                    said.add(&mut groups, headline.event);
+                    self.phrase(&other).add(&mut groups, headline.event);
                 }
             }
         }
@@ -93,7 +91,7 @@ impl<'a> CaptionWriter<'a> {
             self.lasting(lasting).add(&mut groups, lasting.event);
         }
         frame.caption = groups.into_values().map(plural).collect();
-        frame.note = self.note(frame);
+        frame.note = self.note(frame, after);
     }
 
     fn event(&self, id: EventId) -> Option<&'a crate::mission::event_log::Event> {
@@ -102,7 +100,7 @@ impl<'a> CaptionWriter<'a> {
 
     /// The line below the headline: `/robot1 · 4:26 · arm_controller gets no detections`; in a window in which nothing
     /// changes `no change since 3:20`.
-    fn note(&mut self, frame: &Frame) -> String {
+    fn note(&mut self, frame: &Frame, after: &LivingItems) -> String {
         if self.log.compares {
             let none = frame.caption.is_empty().then_some("no difference");
             return none.unwrap_or_default().to_owned();
@@ -134,13 +132,10 @@ impl<'a> CaptionWriter<'a> {
         } else if let [one] = &frame.lasting[..] {
             parts.push(format!("since {}", self.moment(one.since)));
         }
-        let leaves = frame.headlines.iter().filter(|h| {
-            let event = self.event(h.event);
-            event.is_some_and(|e| Part::of(e, frame.span) == Part::Leaves)
-        });
+        let leaves = frame.headlines.iter().filter(|h| h.leaves);
         let away = frame.lasting.iter().filter(|l| l.ended.is_none());
         let mut whats = leaves.map(|h| h.what).chain(away.map(|l| l.what));
-        parts.extend(whats.find_map(|what| self.missed(what)));
+        parts.extend(whats.find_map(|what| self.missed(what, after)));
         parts.retain(|part| !part.is_empty());
         parts.join(" · ")
     }
@@ -154,16 +149,17 @@ impl<'a> CaptionWriter<'a> {
         )
     }
 
-    /// The subscribers without messages while a node is away: `a, b get no detections`; `None` if none is known.
-    fn missed(&self, what: Element) -> Option<String> {
+    /// The living subscribers without messages while a node is away: `a, b get no detections`; `None` if none is known.
+    fn missed(&self, what: Element, after: &LivingItems) -> Option<String> {
         let Element::Node(node) = what else {
             return None;
         };
         let (topic, nodes) = self.audience(node)?;
         let names: Vec<String> = nodes
             .iter()
-            .filter(|id| self.viewed.sees(Element::Node(**id)))
-            .map(|id| self.name(Element::Node(*id)))
+            .map(|id| Element::Node(*id))
+            .filter(|node| self.viewed.sees(*node) && after.has(*node))
+            .map(|node| self.name(node))
             .collect();
         let gets = match names.len() {
             0 => return None,
@@ -204,13 +200,13 @@ impl<'a> CaptionWriter<'a> {
     }
 
     /// The words for a headline. Ends come before beginnings.
-    fn phrase(&self, headline: &Headline, part: Part) -> Said {
+    fn phrase(&self, headline: &Headline) -> Said {
         let name = self.name(headline.what);
         let event = self.event(headline.event);
         if self.log.compares {
             return self.compared(headline);
         }
-        if part == Part::Leaves {
+        if headline.leaves {
             return Said::new(1, '−', name, "goes away");
         }
         match headline.kind {

@@ -47,7 +47,7 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed<'
             member_lists: windows.member_lists.clone(),
             ..Frame::empty(window.index, window.span)
         };
-        writer.write(&mut frame);
+        writer.write(&mut frame, &windows.changes.after);
         frame.many = many(&frame.caption);
         list.push(frame);
     }
@@ -254,12 +254,37 @@ impl<'a> ShownWindows<'a> {
                     changes.after.arrows[id] || is_kept,
                 );
                 let ends = [from, to].map(|end| Some((end.mark, &end.events[..])));
-                shown = changes.arrow(now, id, there, ends);
+                if there != (false, false) || self.met(id, span) {
+                    shown = changes.arrow(now, id, there, ends);
+                }
             }
             self.arrows.show(at, id, shown);
         }
         for (id, shown) in self.viewed.items.ids().zip(items) {
             self.items.show(at, id, shown);
+        }
+    }
+
+    /// Whether an arrow existed in a window, although neither at its beginning nor at its end.
+    fn met(&self, id: ArrowId, span: Span) -> bool {
+        let elements = &self.mission.elements;
+        let whole = |edge: &Element| {
+            let (node, topic) = elements.ends(*edge);
+            let ends = [node.map(Element::Node), topic.map(Element::Topic)];
+            std::iter::once(*edge).chain(ends.into_iter().flatten())
+        };
+        let meet = |edges: &[Element]| {
+            let all: Vec<Element> = edges.iter().flat_map(whole).collect();
+            self.lives.meet(&all, span)
+        };
+        match self.viewed.pairs.get(id) {
+            Some(pairs) => pairs.iter().any(|(publish, subscribe)| {
+                meet(&[Element::Publish(*publish), Element::Subscribe(*subscribe)])
+            }),
+            None => {
+                let edges = self.viewed.arrows[id].members.iter();
+                edges.into_iter().any(|edge| meet(std::slice::from_ref(edge)))
+            }
         }
     }
 
@@ -321,6 +346,8 @@ pub struct Headline {
     pub what: Element,
     /// The time of the event.
     pub time: Stamp,
+    /// Whether it is the absence of a node that returns only in a later window.
+    pub leaves: bool,
 }
 
 impl Headline {
@@ -332,6 +359,7 @@ impl Headline {
             kind: Kind::Started,
             what: Element::Node(crate::graph::NodeId(0)),
             time: Stamp(0),
+            leaves: false,
         }
     }
 }
@@ -506,6 +534,19 @@ impl Counts {
         counts
     }
 
+    /// The same for a box, in which a node that leaves is not back yet.
+    pub(crate) fn inside<'a>(headlines: impl IntoIterator<Item = &'a Headline>) -> Self {
+        let mut counts = Self::default();
+        for headline in headlines {
+            let kind = match headline.kind {
+                _ if headline.leaves => Kind::Stopped,
+                kind => kind,
+            };
+            *counts.slot(kind, headline.what) += 1;
+        }
+        counts
+    }
+
     fn slot(&mut self, kind: Kind, what: Element) -> &mut usize {
         let is_topic = what.is_topic();
         match kind {
@@ -621,6 +662,36 @@ mod tests {
     }
 
     #[test]
+    fn a_line_needs_both_of_its_ends_at_one_time() {
+        let options = ViewOptions {
+            mode: Mode::Nodes,
+            is_picture: true,
+            ..ViewOptions::default()
+        };
+        let got = seen(&["/a>/t /x>/t", "/x>/t /b</t"], &options);
+        assert_eq!(got[1], "-/a +/b /x +/x>/b");
+    }
+
+    #[test]
+    fn a_collapsed_namespace_lives_with_its_nodes() {
+        let options = ViewOptions {
+            collapse: vec!["/n".into()],
+            ..ViewOptions::default()
+        };
+        // The topic that it publishes is already subscribed to, but nothing in it lives.
+        let direct = ViewOptions {
+            mode: Mode::Nodes,
+            is_bundled: true,
+            ..options.clone()
+        };
+        let windows = ["/b</t", "/b</t /n/a>/t /n/c"];
+        assert_eq!(seen(&windows, &direct), ["/b", "/b +/n +/n>/b"]);
+        // Something in it sends, if only an unknown publisher.
+        let windows = ["/n/a /n/c =/n/t@5 /b", "=/n/t@5 /b", "=/n/t@5 /b"];
+        assert_eq!(seen(&windows, &options)[1..], ["/b */n", "/b /n"]);
+    }
+
+    #[test]
     fn rates_mark_topics_and_their_arrows() {
         let windows = ["/a>/t@10 /b</t", "/a>/t@20 /b</t", "/a>/t@5 /b</t"];
         let want = [
@@ -689,6 +760,20 @@ mod tests {
         let got = seen(&windows, &options);
         assert_eq!(got[0], want[0]);
         assert_eq!(got[1], "/a /b /c ^/a>/b -/a>/b /c>/b");
+    }
+
+    #[test]
+    fn more_than_five_changes_have_a_colour_without_a_glow() {
+        let of = |windows: &[&str]| {
+            let (view, _) = view(&mission(windows), &ViewOptions::default());
+            let seen = view.seen(view.frames.len() - 1).items;
+            let marks = seen.iter().filter(|shown| shown.mark.is_some());
+            (marks.clone().count(), marks.filter(|shown| shown.badge().is_some()).count())
+        };
+        assert_eq!(of(&["/a", "/a /b /c /d /e /f"]), (5, 5));
+        assert_eq!(of(&["/a", "/a /b /c /d /e /f /g"]), (6, 0));
+        // Those that stop are visible in this window only, so that they keep the glow.
+        assert_eq!(of(&["/a /b /c /d", "/e /f /g"]), (7, 4));
     }
 
     #[test]

@@ -44,6 +44,8 @@ pub(crate) struct Viewed<'a> {
     carriers: PerElement<Vec<ArrowId>>,
     /// Per topic, whether lines are drawn for it.
     drawn: ById<TopicId, bool>,
+    /// Per topic, whether a publisher is known.
+    is_sent: ById<TopicId, bool>,
     /// The number of items at the end of the list that are listed as words, because no line leads to them.
     pub(crate) in_words: usize,
     /// The number of arrows from node to node that were left out because they were too many.
@@ -80,8 +82,13 @@ impl<'a> Viewed<'a> {
             grouped[*id] = true;
         }
         finish(&mut selection, elements, options, &grouped);
+        let mut is_sent = ById::like(&elements.topics, false);
+        for edge in &elements.publishes {
+            is_sent[edge.topic] = true;
+        }
         let mut viewed = Self {
             elements,
+            is_sent,
             selection,
             fleets: fleets(elements, options),
             items: ById::default(),
@@ -215,6 +222,16 @@ impl<'a> Viewed<'a> {
     /// The part that shows an element.
     pub(crate) fn place(&self, what: Element) -> Place {
         self.places.of(what).copied().unwrap_or(Place::Hidden)
+    }
+
+    /// The members with which an item lives and dies. A collapsed namespace does so with its nodes, and with topics whose
+    /// publishers are unknown: its other topics exist with what is subscribed to them, wherever that is.
+    pub(crate) fn body<'i>(&'i self, item: &'i Item) -> impl Iterator<Item = &'i Element> {
+        let has_nodes = item.members.first().is_some_and(Element::is_node);
+        item.members.iter().filter(move |what| match what {
+            Element::Topic(id) => !has_nodes || !self.is_sent[*id],
+            _ => true,
+        })
     }
 
     /// The item of a node or topic.

@@ -68,6 +68,7 @@ impl WindowMarks {
                 kind: event.kind,
                 what: event.what,
                 time: event.time,
+                leaves: Part::of(event, span) == Part::Leaves,
             });
             changed.report(viewed, event, id, Part::of(event, span));
             // A return has its own mark.
@@ -306,7 +307,7 @@ impl WindowChanges {
     /// The number of headlines reported on a collapsed namespace or a bundle; `None` without any.
     fn inside(&self, shown: &Shown) -> Option<Box<Counts>> {
         let reported = self.marks.headlines.iter();
-        let counts = Counts::of(reported.filter(|h| shown.events.binary_search(&h.event).is_ok()));
+        let counts = Counts::inside(reported.filter(|h| shown.events.binary_search(&h.event).is_ok()));
         (counts.total() > 0).then(|| Box::new(counts))
     }
 }

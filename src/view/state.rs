@@ -40,7 +40,7 @@ impl LivingItems {
     pub(crate) fn of(viewed: &Viewed<'_>, alive: Alive) -> Self {
         let lives = |element: &Element| alive.is(*element);
         let items = viewed.items.iter();
-        let items = items.map(|item| item.members.iter().any(lives));
+        let items = items.map(|item| viewed.body(item).any(lives));
         let items: ById<ItemId, bool> = items.collect();
         let arrow = |(id, arrow): (ArrowId, &Arrow)| {
             let itself = match viewed.pairs.get(id) {
@@ -55,6 +55,11 @@ impl LivingItems {
             arrows,
             alive,
         }
+    }
+
+    /// Whether an element exists.
+    pub(crate) fn has(&self, what: Element) -> bool {
+        self.alive.is(what)
     }
 
     /// Whether a topic of a bundle exists on this line.
@@ -222,6 +227,9 @@ impl<'a> Now<'a> {
                 one.count = None;
             }
             gather(&mut slot, id.0, one);
+        }
+        if has_nodes && !self.viewed.body(item).any(|what| self.lives.0.is(*what)) {
+            return None;
         }
         let mut shown = slot?;
         if item.is_service {
@@ -448,6 +456,18 @@ impl<'a> Lifetimes<'a> {
             let first = bounds.partition_point(|t| t.0 < span.start);
             let inside = bounds[first..].iter().take_while(|t| t.0 < span.end);
             lives_at(bounds, first) || inside.into_iter().any(|t| t.1)
+        })
+    }
+
+    /// Whether all of some elements exist at one moment of a window: a publisher that stops before a subscriber starts has no
+    /// line to it.
+    pub(crate) fn meet(&self, all: &[Element], span: Span) -> bool {
+        let bounds = || all.iter().filter_map(|what| self.bounds.of(*what));
+        let times = bounds().flatten().map(|bound| bound.0);
+        let inside = times.filter(|at| (span.start..span.end).contains(at));
+        std::iter::once(span.start).chain(inside).any(|at| {
+            let lives = |bounds: &Vec<_>| lives_at(bounds, bounds.partition_point(|t| t.0 <= at));
+            bounds().all(lives)
         })
     }
 

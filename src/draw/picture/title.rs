@@ -196,7 +196,7 @@ impl<'a> Title<'a> {
             if view.frames.len() > 1 {
                 parts.insert(0, format!("of {}", at(end)));
             }
-            parts.push(words::date_and_clock(shown.start.0));
+            parts.extend(words::date_and_clock(shown.start.0));
             format!("{} – {}", at(shown.start), at(shown.end))
         };
         parts.retain(|part| !part.is_empty());

@@ -131,7 +131,7 @@ pub(super) fn json(page: &HtmlPage<'_>, still: usize) -> String {
         starts: frames.iter().map(|f| clock.secs(f.span.start)).collect(),
         ends: frames.iter().map(|f| clock.secs(f.span.end)).collect(),
         epoch: clock.0.0.div_euclid(1_000_000),
-        date: words::date(clock.0.0),
+        date: words::date(clock.0.0).unwrap_or_default(),
         reported: reported(page, &places, clock),
         phases: phases(mission, clock),
         rows: lives.map_or_else(Vec::new, |lives| rows(lives, &places, clock)),
