@@ -33,8 +33,8 @@ pub mod mission {
 #[cfg(feature = "render")]
 pub mod view {
     pub use crate::view::{
-        AlsoHere, Arrow, ArrowId, ArrowKind, CardRow, Collapsible, Counts, Frame, Headline,
-        Item, ItemId, ItemKind, Lasting, Looks, Mark, MemberState, Members, Namespace, Phrase,
+        AlsoHere, Arrow, ArrowId, ArrowKind, CardRow, Collapsible, Counts, Frame, Headline, Item,
+        ItemId, ItemKind, Lasting, Looks, Mark, MemberState, Members, Namespace, Phrase,
         SeenWindow, Shown, TopicRow, View, ViewOptions, view,
     };
 }

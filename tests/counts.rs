@@ -149,7 +149,9 @@ fn coloured(svg: &str, shown: &BTreeSet<u64>, mission: &Value, at: &str) {
         .collect();
     for id in shown {
         let event = &mission["events"][usize::try_from(*id).unwrap()];
-        let is_life = ["started", "stopped", "restarted"].iter().any(|kind| event["kind"] == **kind);
+        let is_life = ["started", "stopped", "restarted"]
+            .iter()
+            .any(|kind| event["kind"] == **kind);
         if event["what"] == "node" && is_life {
             assert!(nodes.contains(id), "{} of {at}", event["name"]);
         }

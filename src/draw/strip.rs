@@ -268,7 +268,9 @@ impl<'a> StripSource<'a> {
             times = format!("{times} {phase}");
         }
         let fits = |words: &[Words]| {
-            self.fonts.width(&joined(words), page.caption, Weight::Regular) <= page.panel.w
+            self.fonts
+                .width(&joined(words), page.caption, Weight::Regular)
+                <= page.panel.w
         };
         let lines = [
             (times, Weight::SemiBold),

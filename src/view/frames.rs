@@ -277,15 +277,13 @@ impl<'a> ShownWindows<'a> {
             let all: Vec<Element> = edges.iter().flat_map(whole).collect();
             self.lives.meet(&all, span)
         };
-        match self.viewed.pairs.get(id) {
-            Some(pairs) => pairs.iter().any(|(publish, subscribe)| {
+        if let Some(pairs) = self.viewed.pairs.get(id) {
+            return pairs.iter().any(|(publish, subscribe)| {
                 meet(&[Element::Publish(*publish), Element::Subscribe(*subscribe)])
-            }),
-            None => {
-                let edges = self.viewed.arrows[id].members.iter();
-                edges.into_iter().any(|edge| meet(std::slice::from_ref(edge)))
-            }
+            });
         }
+        let mut edges = self.viewed.arrows[id].members.iter();
+        edges.any(|edge| meet(std::slice::from_ref(edge)))
     }
 
     /// Shows a window without headlines after another without: all elements stay present or away as they are.
@@ -768,7 +766,10 @@ mod tests {
             let (view, _) = view(&mission(windows), &ViewOptions::default());
             let seen = view.seen(view.frames.len() - 1).items;
             let marks = seen.iter().filter(|shown| shown.mark.is_some());
-            (marks.clone().count(), marks.filter(|shown| shown.badge().is_some()).count())
+            (
+                marks.clone().count(),
+                marks.filter(|shown| shown.badge().is_some()).count(),
+            )
         };
         assert_eq!(of(&["/a", "/a /b /c /d /e /f"]), (5, 5));
         assert_eq!(of(&["/a", "/a /b /c /d /e /f /g"]), (6, 0));

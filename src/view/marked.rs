@@ -307,7 +307,8 @@ impl WindowChanges {
     /// The number of headlines reported on a collapsed namespace or a bundle; `None` without any.
     fn inside(&self, shown: &Shown) -> Option<Box<Counts>> {
         let reported = self.marks.headlines.iter();
-        let counts = Counts::inside(reported.filter(|h| shown.events.binary_search(&h.event).is_ok()));
+        let counts =
+            Counts::inside(reported.filter(|h| shown.events.binary_search(&h.event).is_ok()));
         (counts.total() > 0).then(|| Box::new(counts))
     }
 }

@@ -113,9 +113,8 @@ impl<'a> Title<'a> {
         // Behind words there is room for whole parts only.
         let is_behind = second.x > self.left();
         let gap = if is_behind { small } else { 0.0 };
-        let fits = |below: &[String]| {
-            self.width(&below.join(NOTES), small, Weight::Regular) + gap <= rest
-        };
+        let fits =
+            |below: &[String]| self.width(&below.join(NOTES), small, Weight::Regular) + gap <= rest;
         while is_behind && !below.is_empty() && !fits(&below) {
             below.pop();
         }
