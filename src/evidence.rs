@@ -29,6 +29,8 @@ pub(crate) mod values;
 pub use observation::{Confidence, EvidenceLine};
 pub use source::Source;
 
+use serde::{Deserialize, Serialize};
+
 use message::dynamic;
 use source::Read::{Log, Parameters, Payload};
 use source::{
@@ -38,8 +40,25 @@ use source::{
 };
 
 /// A set of kinds of evidence: bits at the indices of rows in [`SOURCES`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(
+    Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize,
+)]
+#[serde(from = "Vec<String>", into = "Vec<&'static str>")]
 pub struct Evidence(u64);
+
+/// In JSON: the words; unknown ones are ignored.
+impl From<Vec<String>> for Evidence {
+    fn from(words: Vec<String>) -> Self {
+        let all = words.iter().map(|word| Self::of(word));
+        all.fold(Self::NONE, Self::and)
+    }
+}
+
+impl From<Evidence> for Vec<&'static str> {
+    fn from(evidence: Evidence) -> Self {
+        evidence.words().collect()
+    }
+}
 
 impl Evidence {
     /// No evidence.

@@ -21,7 +21,9 @@ use crate::graph::history::restarts::restarts;
 use crate::graph::history::senders::{Sender as TopicSender, Traffic};
 use crate::graph::history::tracks::fall_silent;
 use crate::graph::history::tracks::{Tracks, tracks};
-use crate::graph::history::{Bound, Life, Sender, Sending, Stretch, Transition, all_silent};
+use crate::graph::history::{
+    Bound, Life, Sender, Sending, Silence, Stretch, Transition, all_silent,
+};
 use crate::graph::{
     ById, Edge, Element, Elements, Existence, Node, NodeId, PerElement, State, Topic, TopicId,
 };
@@ -71,14 +73,14 @@ pub(crate) struct Record {
     /// Whether it is silent without a message in the window.
     needs_messages: bool,
     /// The times at which it was silent although it existed; `None` for a silence to the end.
-    silences: Vec<(Stamp, Option<Stamp>)>,
+    silences: Vec<Silence>,
 }
 
 impl Record {
     fn new(
         track: &Liveness,
         mission: (Stamp, Stamp),
-        silences: Vec<(Stamp, Option<Stamp>)>,
+        silences: Vec<Silence>,
     ) -> Self {
         let fixed = match () {
             () if track.is_declared() => Some(State::Declared),
@@ -95,7 +97,7 @@ impl Record {
     }
 
     /// The times at which it was silent although it existed; `None` for a silence to the end.
-    pub(crate) fn silences(&self) -> &[(Stamp, Option<Stamp>)] {
+    pub(crate) fn silences(&self) -> &[Silence] {
         &self.silences
     }
 
@@ -106,7 +108,7 @@ impl Record {
 
     /// The state in a window in which it exists, with or without messages of its own.
     pub(crate) fn state(&self, window: Span, has_messages: bool) -> State {
-        let covers = |(from, to): &(Stamp, Option<Stamp>)| {
+        let covers = |(from, to): &Silence| {
             *from < window.start && to.is_none_or(|to| window.end <= to)
         };
         match self.fixed {
@@ -369,7 +371,7 @@ impl Assembly<'_> {
     }
 
     /// Adds the record of the newest element of a kind.
-    fn keep(&mut self, what: Element, track: &Liveness, silent: Vec<(Stamp, Option<Stamp>)>) {
+    fn keep(&mut self, what: Element, track: &Liveness, silent: Vec<Silence>) {
         let record = Record::new(track, self.findings.mission, silent);
         self.history.records.push(what, record);
     }
@@ -384,13 +386,13 @@ impl Assembly<'_> {
     }
 
     /// The times at which all senders of a topic are silent.
-    fn topic_silences(&self, topic: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
+    fn topic_silences(&self, topic: Name, lives: &[Span]) -> Vec<Silence> {
         let all = self.traffic.some(topic).into_iter().flat_map(|of| &of.list);
         self.silences(all.filter(|sender| !sender.latched), lives)
     }
 
     /// The times at which a node is silent on all its topics.
-    fn node_silences(&self, node: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
+    fn node_silences(&self, node: Name, lives: &[Span]) -> Vec<Silence> {
         let of = self.sent.of(node).iter().copied();
         self.silences(of, lives)
     }
@@ -400,7 +402,7 @@ impl Assembly<'_> {
         &self,
         senders: impl Iterator<Item = &'s TopicSender> + Clone,
         lives: &[Span],
-    ) -> Vec<(Stamp, Option<Stamp>)> {
+    ) -> Vec<Silence> {
         let lives = TopicSender::within(senders.clone(), lives);
         let of: Vec<&[Stretch]> = senders.map(|sender| &sender.stretches[..]).collect();
         all_silent(&of, &lives, &self.history.pauses)
