@@ -61,7 +61,25 @@ pub(crate) enum ElementKey {
     Subscribe(Name, Name),
 }
 
+/// What a node does with a topic, in words.
+pub(crate) fn verb(publishes: bool) -> &'static str {
+    if publishes {
+        "publishes"
+    } else {
+        "subscribes to"
+    }
+}
+
 impl ElementKey {
+    /// A node publishes a topic, or subscribes to it.
+    pub(crate) fn edge(publishes: bool, node: Name, topic: Name) -> Self {
+        if publishes {
+            Self::Publish(node, topic)
+        } else {
+            Self::Subscribe(topic, node)
+        }
+    }
+
     /// The node and the topic: both for an edge, otherwise one.
     pub(crate) fn ends(self) -> [Option<Name>; 2] {
         match self {

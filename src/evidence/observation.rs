@@ -114,6 +114,15 @@ observations! {
 }
 
 impl Observation {
+    /// A node publishes a topic, or subscribes to it.
+    pub(crate) fn edge(publishes: bool, node: Name, topic: Name) -> Self {
+        if publishes {
+            Self::Publish(node, topic)
+        } else {
+            Self::Subscribe(node, topic)
+        }
+    }
+
     /// The first two names in the observation.
     pub(crate) fn names(self) -> [Option<Name>; 2] {
         let (first, second) = (Cell::new(None), Cell::new(None));

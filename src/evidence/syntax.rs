@@ -77,6 +77,18 @@ pub(crate) fn children(node: Node<'_>) -> Vec<Node<'_>> {
     all.filter(|child| !child.is_extra()).collect()
 }
 
+/// These fields of an element; `None` unless it has all of them.
+pub(crate) fn fields<'a, const N: usize>(
+    node: Node<'a>,
+    names: [&str; N],
+) -> Option<[Node<'a>; N]> {
+    let mut found = [node; N];
+    for (field, name) in found.iter_mut().zip(names) {
+        *field = node.child_by_field_name(name)?;
+    }
+    Some(found)
+}
+
 /// The arguments of a call.
 pub(crate) fn arguments(call: Node<'_>) -> Vec<Node<'_>> {
     let list = call.child_by_field_name("arguments");

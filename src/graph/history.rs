@@ -282,11 +282,7 @@ pub(crate) fn hide(pauses: &[Span], (from, to): Silence) -> bool {
 
 /// The silences of a sender with a rhythm during its lifetimes (`lives`, half-open) and not in pauses of the recording:
 /// from the last message to the next, or `None` if there is none. A sender of bursts is never silent.
-pub(crate) fn silences(
-    stretches: &[Stretch],
-    lives: &[Span],
-    pauses: &[Span],
-) -> Vec<Silence> {
+pub(crate) fn silences(stretches: &[Stretch], lives: &[Span], pauses: &[Span]) -> Vec<Silence> {
     let mut found = Vec::new();
     for life in lives {
         let inside = |s: &&Stretch| life.start <= s.first && s.first < life.end;
@@ -318,11 +314,7 @@ pub(crate) fn silences(
 }
 
 /// The times at which all of several senders are silent, if at least one has a rhythm that stopped.
-pub(crate) fn all_silent(
-    senders: &[&[Stretch]],
-    lives: &[Span],
-    pauses: &[Span],
-) -> Vec<Silence> {
+pub(crate) fn all_silent(senders: &[&[Stretch]], lives: &[Span], pauses: &[Span]) -> Vec<Silence> {
     let found = senders.iter().flat_map(|own| silences(own, lives, pauses));
     let mut found: Vec<Silence> = found.collect();
     found.sort_unstable();

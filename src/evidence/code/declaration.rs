@@ -20,10 +20,7 @@ worded! {
 impl Role {
     /// The edge of a node in this role.
     pub(super) fn edge(self, node: Name, topic: Name) -> ElementKey {
-        match self {
-            Self::Publishes => ElementKey::Publish(node, topic),
-            Self::Subscribes => ElementKey::Subscribe(topic, node),
-        }
+        ElementKey::edge(self == Self::Publishes, node, topic)
     }
 }
 

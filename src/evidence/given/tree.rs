@@ -27,6 +27,8 @@ impl Tree {
     }
 }
 
+/// The longest text of an attribute after substitution, in bytes: longer than any path.
+pub(super) const LONGEST: usize = 64 << 10;
 /// The deepest nesting of elements; deeper ones are hostile.
 pub(super) const DEEPEST: usize = 64;
 /// The most attributes of an element, whose parsing takes the square of their number.

@@ -13,7 +13,7 @@ use super::SourceContext;
 use crate::base::csv;
 use crate::base::ids::ById;
 use crate::base::name::{last_part, resolved};
-use crate::evidence::inference::{Conclusions, ElementKey};
+use crate::evidence::inference::{Conclusions, ElementKey, verb};
 use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Name, Observation, SourceId};
 
@@ -148,15 +148,11 @@ fn publish(source: SourceId, known: &mut Conclusions<'_>, topic: Name, nodes: &[
 }
 
 fn words(known: &Conclusions<'_>, node: Name, contract: &Contract) -> String {
-    let verb = if contract.publishes {
-        "publishes"
-    } else {
-        "subscribes to"
-    };
     format!(
-        "{} is assumed to be the one of package {}, which {verb} {} (contracts.csv line {}: {})",
+        "{} is assumed to be the one of package {}, which {} {} (contracts.csv line {}: {})",
         known.text(node),
         contract.package,
+        verb(contract.publishes),
         contract.topic,
         contract.line,
         contract.reference.trim_start_matches("https://")

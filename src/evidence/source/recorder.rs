@@ -60,16 +60,8 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
 /// `rosbag2_interfaces/msg/MessagesLostEvent`.
 pub(crate) const LOST: MessageLayout = MessageLayout::ros2(
     "rosbag2_interfaces/MessagesLostEvent",
-    &[
-        (
-            "",
-            "string node_name;MessagesLostEventTopicStat[] messages_lost_statistics",
-        ),
-        (
-            "MessagesLostEventTopicStat",
-            "string topic_name;uint64 messages_lost_in_transport;uint64 messages_lost_in_recorder",
-        ),
-    ],
+    "string node_name;MessagesLostEventTopicStat[] messages_lost_statistics
+     MessagesLostEventTopicStat: string topic_name;uint64 messages_lost_in_transport;uint64 messages_lost_in_recorder",
 );
 
 pub(crate) fn read_lost(

@@ -77,11 +77,7 @@ pub(crate) struct Record {
 }
 
 impl Record {
-    fn new(
-        track: &Liveness,
-        mission: (Stamp, Stamp),
-        silences: Vec<Silence>,
-    ) -> Self {
+    fn new(track: &Liveness, mission: (Stamp, Stamp), silences: Vec<Silence>) -> Self {
         let fixed = match () {
             () if track.is_declared() => Some(State::Declared),
             () if track.is_latched() => Some(State::Latched),
@@ -108,9 +104,8 @@ impl Record {
 
     /// The state in a window in which it exists, with or without messages of its own.
     pub(crate) fn state(&self, window: Span, has_messages: bool) -> State {
-        let covers = |(from, to): &Silence| {
-            *from < window.start && to.is_none_or(|to| window.end <= to)
-        };
+        let covers =
+            |(from, to): &Silence| *from < window.start && to.is_none_or(|to| window.end <= to);
         match self.fixed {
             Some(state) => state,
             None if has_messages => State::Active,
