@@ -176,8 +176,14 @@ impl<'a> Changes<'a> {
         let mut changes = Vec::new();
         if let Some((old_span, old)) = self.before.take() {
             let diff = diff(&old, graph);
-            self.appeared(&diff, span, &mut changes);
-            self.vanished(&diff, span, &mut changes);
+            changes.extend(diff.added.iter().map(|state| Change::Added {
+                what: state.what,
+                time: (self.elements.seen(state.what).first).filter(|t| span.contains(*t)),
+            }));
+            changes.extend(diff.removed.iter().map(|what| Change::Removed {
+                what: *what,
+                time: (self.elements.seen(*what).last).filter(|t| *t < span.end),
+            }));
             self.rates(&diff, graph, (old_span, span), &mut changes);
             self.handed_over(&old, graph, &mut changes);
             let again = restarts.iter().map(|(node, time)| Change::Restarted {
@@ -202,23 +208,6 @@ impl<'a> Changes<'a> {
             }
             _ => false,
         }
-    }
-
-    fn appeared(&self, diff: &Diff, span: Span, changes: &mut Vec<Change>) {
-        changes.extend(diff.added.iter().map(|state| {
-            let what = state.what;
-            let first = self.elements.seen(what).first;
-            let time = first.filter(|t| span.contains(*t));
-            Change::Added { what, time }
-        }));
-    }
-
-    fn vanished(&self, diff: &Diff, span: Span, changes: &mut Vec<Change>) {
-        changes.extend(diff.removed.iter().map(|what| {
-            let what = *what;
-            let time = self.elements.seen(what).last.filter(|t| *t < span.end);
-            Change::Removed { what, time }
-        }));
     }
 
     fn rates(&self, diff: &Diff, graph: &Graph, spans: (Span, Span), changes: &mut Vec<Change>) {
@@ -358,11 +347,8 @@ fn sent(elements: &Elements) -> ById<TopicId, (Option<Stamp>, Option<Stamp>)> {
 }
 
 fn lifecycles(diff: &Diff, changes: &mut Vec<Change>) {
-    for (old, new) in diff
-        .changed
-        .iter()
-        .filter(|(old, new)| old.lifecycle != new.lifecycle)
-    {
+    let differs = |(old, new): &&(ElementState, ElementState)| old.lifecycle != new.lifecycle;
+    for (old, new) in diff.changed.iter().filter(differs) {
         let word = |state: &Option<Arc<str>>| state.clone().unwrap_or_default();
         changes.push(Change::Value {
             kind: ValueKind::Lifecycle,

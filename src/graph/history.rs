@@ -3,10 +3,11 @@
 //!
 //! In: everything recorded, and the findings. Out: a [`History`], made once, from which windows, events, phases and figures
 //! are derived; nothing here depends on windows. Begin with `records`, which calls the others in order: `senders` reads the
-//! times of every topic, `recordings` and `restarts` find pauses and restarts in them, `tracks` collects the signs of each
-//! element, `lifetimes` decides when it existed.
+//! times of every topic, `restarts` and `pauses` find restarts and the pauses of `recordings` in them, `tracks` collects the signs
+//! of each element, `lifetimes` decides when it existed.
 
 mod lifetimes;
+mod pauses;
 mod recordings;
 pub(crate) mod records;
 mod restarts;

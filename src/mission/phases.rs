@@ -18,6 +18,7 @@ use self::presence::{Presence, is_topics, presences};
 pub(crate) use self::presence::{fill, knows_publishers};
 use crate::base::time::{Span, Stamp};
 use crate::graph::history::Sending;
+use crate::graph::window::between;
 use crate::graph::{Elements, TopicId};
 use crate::mission::event_log::Phase;
 
@@ -55,13 +56,6 @@ pub fn phases(elements: &Elements, sending: &Sending, whole: Span) -> Vec<Phase>
     let (spans, found, ramps) = ramp::joined(&spans, &found, whole.nanos());
     let unit = if is_topics(&present) { "topic" } else { "node" };
     reported(&spans, &found, &ramps, unit)
-}
-
-/// The intervals from each start to the next, the last one to `end`.
-fn between(starts: &[Stamp], end: Stamp) -> Vec<Span> {
-    let ends = starts.iter().skip(1).copied().chain([end]);
-    let pairs = starts.iter().zip(ends);
-    pairs.map(|(start, end)| Span::new(*start, end)).collect()
 }
 
 /// The phases for given intervals, such as the user's, with the changes between them, by majority.

@@ -2,7 +2,7 @@
 //! both. For example, `/nav` logs from 3 s to 90 s and sends `/plan` at 1 Hz until 90 s of 300 s: `/nav` exists until 90 s,
 //! `/nav` publishes `/plan` for as long, and `/plan` exists as long as one of its ends does.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use crate::base::rhythm::{
@@ -15,8 +15,15 @@ use crate::evidence::observation::Name;
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::ById;
 use crate::graph::history::restarts::{Restart, Restarts};
-use crate::graph::history::tracks::Tracks;
 use crate::graph::history::{Bound, Stretch, hide};
+
+/// The signs and lifetimes of every element.
+///
+/// Boxed, since the tree reserves much unused memory.
+pub(crate) type Tracks = BTreeMap<ElementKey, Box<Liveness>>;
+
+/// The elements that exist as long as others, each with its other.
+pub(crate) type Likes = Vec<(ElementKey, ElementKey)>;
 
 /// No edge has a smaller key: nodes and topics come before.
 const FIRST_EDGE: ElementKey = ElementKey::Publish(Name(0), Name(0));
@@ -196,14 +203,15 @@ impl Lifetime {
         (self.to, self.ended) = (to.max(self.from), ended);
     }
 
-    fn at(sign: Stamp) -> Self {
+    /// One of a single sign, which began after `gone`.
+    fn at(sign: Stamp, gone: Stamp) -> Self {
         Self {
             from: sign,
             to: sign,
             sign,
             began: Some(Bound {
                 time: sign,
-                earliest: Stamp::MIN,
+                earliest: gone,
                 latest: sign,
             }),
             ended: None,
@@ -289,14 +297,7 @@ fn lives(signs: &[Stamp], ends: &[Stamp]) -> Vec<Lifetime> {
         }
         match lives.last_mut() {
             Some(life) if open => life.end_at(*sign, None),
-            _ => {
-                let mut life = Lifetime::at(*sign);
-                life.began = life.began.map(|b| Bound {
-                    earliest: gone,
-                    ..b
-                });
-                lives.push(life);
-            }
+            _ => lives.push(Lifetime::at(*sign, gone)),
         }
         open = true;
     }
@@ -341,14 +342,12 @@ impl Pulse {
         recorder: &[Span],
     ) -> Option<Self> {
         let last = stretches.last()?;
-        let away = |p: &[Stretch]| {
-            restarts
-                .iter()
-                .any(|r| p[0].last <= r.birth && r.death <= p[1].first)
-        };
-        let is_own = |p: &&[Stretch]| !hide(recorder, (p[0].last, Some(p[1].first)));
-        let pauses = stretches.windows(2).filter(|p| !away(p)).filter(is_own);
-        let pauses = pauses.map(|p| p[1].first.since(p[0].last));
+        let pauses = stretches.windows(2).map(|p| (p[0].last, p[1].first));
+        let pauses = pauses.filter(|(from, to)| {
+            let mut away = restarts.iter().map(|r| *from <= r.birth && r.death <= *to);
+            !away.any(|is_away| is_away) && !hide(recorder, (*from, Some(*to)))
+        });
+        let pauses = pauses.map(|(from, to)| to.since(from));
         (last.count >= FEWEST).then(|| Self {
             first: stretches[0].first,
             last: last.last,
@@ -631,12 +630,8 @@ impl Liveness {
         self.ends.sort_unstable();
         self.ends.dedup();
         self.stated.sort_unstable();
-        if self.is_whole() || self.signs.is_empty() {
-            self.lives = if self.is_whole() {
-                Rc::clone(node)
-            } else {
-                Rc::default()
-            };
+        if self.is_whole() {
+            self.lives = Rc::clone(node);
             return;
         }
         let mut own = Vec::new();
@@ -682,12 +677,12 @@ impl Liveness {
         let mut until = Stamp::MIN;
         for life in Rc::make_mut(&mut self.lives) {
             let around = |o: &&Lifetime| o.from() < life.from() && life.from() <= o.to();
-            if let Some(other) = others.iter().find(around).filter(|o| until < o.from())
-                && !self
-                    .ends
-                    .iter()
-                    .any(|end| other.from() <= *end && *end < life.from())
-            {
+            let is_absent = |from: Stamp| {
+                let mut ends = self.ends.iter();
+                ends.any(|end| from <= *end && *end < life.from())
+            };
+            let other = others.iter().find(around).filter(|o| until < o.from());
+            if let Some(other) = other.filter(|other| !is_absent(other.from())) {
                 life.begin_at(other.from(), other.began);
                 is_earlier = true;
             }

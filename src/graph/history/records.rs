@@ -13,14 +13,12 @@ use crate::evidence::conclude::Findings;
 use crate::evidence::inference::{ElementKey, IncidentKind};
 use crate::evidence::observation::Name;
 use crate::evidence::{Confidence, Evidence};
-use crate::graph::history::lifetimes::Lifetime;
-use crate::graph::history::lifetimes::Liveness;
-use crate::graph::history::lifetimes::compute_lifetimes;
-use crate::graph::history::recordings::{doubled, pauses};
+use crate::graph::history::lifetimes::{Lifetime, Liveness, Tracks, compute_lifetimes};
+use crate::graph::history::pauses::pauses;
+use crate::graph::history::recordings::doubled;
 use crate::graph::history::restarts::restarts;
 use crate::graph::history::senders::{Sender as TopicSender, Traffic};
-use crate::graph::history::tracks::fall_silent;
-use crate::graph::history::tracks::{Tracks, tracks};
+use crate::graph::history::tracks::{fall_silent, tracks};
 use crate::graph::history::{
     Bound, Life, Sender, Sending, Silence, Stretch, Transition, all_silent,
 };
@@ -78,15 +76,11 @@ pub(crate) struct Record {
 
 impl Record {
     fn new(track: &Liveness, mission: (Stamp, Stamp), silences: Vec<Silence>) -> Self {
-        let fixed = match () {
-            () if track.is_declared() => Some(State::Declared),
-            () if track.is_latched() => Some(State::Latched),
-            () => None,
-        };
+        let is_latched = track.is_latched().then_some(State::Latched);
         Self {
             confidence: track.confidence,
             lives: known(track, mission),
-            fixed,
+            fixed: (track.is_declared().then_some(State::Declared)).or(is_latched),
             needs_messages: !track.has_senders(),
             silences,
         }
@@ -154,9 +148,9 @@ fn assembled(
     findings: &Findings,
     (pauses, doubled): (Vec<Span>, BTreeSet<Name>),
 ) -> History {
-    let streams = traffic.iter().map(|of| {
-        let streams = of.as_ref().map(|of| of.streams.clone());
-        streams.unwrap_or_default()
+    let streams = traffic.iter().map(|of| match of {
+        Some(of) => of.streams.clone(),
+        None => Vec::new(),
     });
     let mut all = Assembly {
         history: History {
@@ -185,9 +179,8 @@ fn assembled(
     all.senders();
     all.transitions();
     all.incidents();
-    let ids = doubled
-        .iter()
-        .filter_map(|node| all.history.node_ids.some(*node));
+    let ids = doubled.iter();
+    let ids = ids.filter_map(|node| all.history.node_ids.some(*node));
     all.history.doubled = ids.copied().collect();
     all.history
 }

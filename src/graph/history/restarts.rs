@@ -29,7 +29,7 @@ pub(crate) struct Restart {
 pub(crate) type Restarts = ById<Name, Vec<Restart>>;
 
 /// The most messages of a latched topic: one with more is sent again all the time, so that a repetition shows nothing.
-const LATCHED: u64 = 20;
+pub(super) const LATCHED: u64 = 20;
 /// The most gaps, of all nodes together, around which numbers are requested: each requires reading two
 /// chunks.
 const MOST_ASKED: usize = 256;
@@ -72,12 +72,8 @@ impl Own<'_> {
     /// The times of its messages, sorted.
     fn times(&self, recorded: &Recorded) -> io::Result<Vec<Stamp>> {
         let of = |at: &usize| recorded.messages.times(recorded.streams[*at].times);
-        let mut times = self
-            .streams
-            .iter()
-            .map(of)
-            .collect::<io::Result<Vec<_>>>()?
-            .concat();
+        let times = self.streams.iter().map(of);
+        let mut times = times.collect::<io::Result<Vec<_>>>()?.concat();
         times.sort_unstable();
         Ok(times)
     }
@@ -108,9 +104,7 @@ fn own_streams<'a>(findings: &Findings, traffic: &'a Traffic) -> ById<Name, Vec<
 /// The gaps in any of a node's streams during which none of its other streams continued.
 fn gaps(recorded: &Recorded, own: &[Own<'_>]) -> io::Result<BTreeSet<(Stamp, Stamp)>> {
     let steady = own.iter().filter(|own| !own.sender.latched);
-    let pairs = steady.flat_map(|own| own.sender.stretches.windows(2));
-    let apart = pairs.filter(|pair| !pair[1].is_joined);
-    let mut gaps: BTreeSet<_> = apart.map(|pair| (pair[0].last, pair[1].first)).collect();
+    let mut gaps: BTreeSet<_> = steady.flat_map(|own| own.sender.gaps()).collect();
     for one in own {
         // Read on demand, and only for streams with few messages.
         let mut times = None;
@@ -166,12 +160,13 @@ fn numbered(recorded: &Recorded, own: &Own<'_>) -> io::Result<Vec<(usize, Vec<St
 fn around_all(streams: &[(usize, Vec<Stamp>)], gap: (Stamp, Stamp)) -> Option<(Place, Place)> {
     let middle = middle(gap);
     let cut = |times: &[Stamp]| times.partition_point(|time| *time <= middle);
-    let before = streams
-        .iter()
-        .filter_map(|(at, times)| Some((*times.get(cut(times).checked_sub(1)?)?, *at)));
-    let after = streams
-        .iter()
-        .filter_map(|(at, times)| Some((*times.get(cut(times))?, *at)));
+    let all = || {
+        streams
+            .iter()
+            .map(|(at, times)| (times.split_at(cut(times)), *at))
+    };
+    let before = all().filter_map(|((before, _), at)| Some((*before.last()?, at)));
+    let after = all().filter_map(|((_, after), at)| Some((*after.first()?, at)));
     Some((before.max()?, after.min()?))
 }
 
@@ -220,16 +215,12 @@ pub(crate) fn restarts(
     for node in doubled {
         nodes.grown(*node).clear();
     }
-    let falls = nodes
-        .with_ids()
-        .map(|(node, own)| falls_of(recorded, findings, node, own));
+    let falls = nodes.with_ids();
+    let falls = falls.map(|(node, own)| falls_of(recorded, findings, node, own));
     let falls: ById<Name, Vec<Fall>> = falls.collect::<io::Result<_>>()?;
     let mut alike: BTreeMap<_, Vec<(Name, &Fall)>> = BTreeMap::new();
-    for (node, fall) in falls
-        .with_ids()
-        .flat_map(|(node, of)| of.iter().map(move |f| (node, f)))
-    {
-        if fall.first.stamp != 0 {
+    for (node, of) in falls.with_ids() {
+        for fall in of.iter().filter(|fall| fall.first.stamp != 0) {
             alike.entry(fall.header()).or_default().push((node, fall));
         }
     }
@@ -269,10 +260,8 @@ fn counts_on(recorded: &Recorded, log: &Own<'_>, gap: (Stamp, Stamp)) -> bool {
     log.streams.iter().any(|at| {
         let times = recorded.messages.times(recorded.streams[*at].times);
         let around = times.ok().and_then(|times| around(&times, gap));
-        let numbers = recorded.numbers.some(*at);
-        around
-            .zip(numbers)
-            .is_some_and(|((from, to), numbers)| numbers.count_on(from, to))
+        let both = around.zip(recorded.numbers.some(*at));
+        both.is_some_and(|((from, to), numbers)| numbers.count_on(from, to))
     })
 }
 
@@ -333,11 +322,8 @@ fn falls_of(
                 (all.0.max(gap.0), all.1.min(gap.1))
             });
             // Which of several gaps the restart was in, this stream does not show.
-            let (from, to) = if common.0 < common.1 {
-                common
-            } else {
-                (last, next)
-            };
+            let is_one = common.0 < common.1;
+            let (from, to) = if is_one { common } else { (last, next) };
             let begun = numbers.filter(|(before, first)| first.begins_after(*before));
             falls.extend(begun.map(|(number, first)| Fall {
                 from,
@@ -366,20 +352,14 @@ fn between_records(
         |(at, times): &(usize, Vec<Stamp>)| Some(((*times.first()?, *at), (*times.last()?, *at)));
     let mut parts: Vec<(Place, Place)> = streams.iter().filter_map(ends).collect();
     parts.sort_unstable();
-    let next: Vec<(Place, Place)> = parts
-        .windows(2)
-        .map(|pair| (pair[0].1, pair[1].0))
-        .collect();
-    let next = next.into_iter().filter(|(last, first)| last.0 < first.0);
+    let next = parts.windows(2).map(|pair| (pair[0].1, pair[1].0));
+    let next: Vec<_> = next.filter(|(last, first)| last.0 < first.0).collect();
     let inside = streams.iter().flat_map(|(at, _)| {
-        let falls = recorded
-            .numbers
-            .some(*at)
-            .into_iter()
-            .flat_map(|own| &own.falls);
+        let numbers = recorded.numbers.some(*at).into_iter();
+        let falls = numbers.flat_map(|own| &own.falls);
         falls.map(|(from, to)| ((*from, *at), (*to, *at)))
     });
-    next.chain(inside)
+    next.into_iter().chain(inside)
 }
 
 /// All statements about each node.
@@ -414,11 +394,8 @@ fn sent_again(recorded: &Recorded, own: &[Own<'_>]) -> io::Result<Vec<(Stamp, St
     if rhythms().next().is_none() {
         return Ok(found);
     }
-    for at in own
-        .iter()
-        .filter(|own| own.sender.latched)
-        .flat_map(|own| &own.streams)
-    {
+    let latched = own.iter().filter(|own| own.sender.latched);
+    for at in latched.flat_map(|own| &own.streams) {
         let latched = recorded.streams[*at].times;
         if !(2..=LATCHED).contains(&recorded.messages.count(latched)) {
             continue;

@@ -11,20 +11,12 @@ use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;
 use crate::evidence::inference::{ElementKey, Inference, Reliability, Validity};
 use crate::evidence::observation::Name;
-use crate::evidence::{Confidence, Evidence, SOURCES};
+use crate::evidence::{Confidence, Evidence, SOURCES, source_word};
 use crate::graph::ById;
-use crate::graph::history::lifetimes::{Extent, Liveness, Pulse};
-use crate::graph::history::restarts::{Restart, Restarts};
+use crate::graph::history::lifetimes::{Extent, Likes, Liveness, Pulse, Tracks};
+use crate::graph::history::restarts::{LATCHED, Restart, Restarts};
 use crate::graph::history::senders::{Sender, Senders, Traffic};
 use crate::graph::history::{Stretch, begins_steadily};
-
-/// The track of every element.
-///
-/// Boxed, since the tree reserves much unused memory.
-pub(crate) type Tracks = BTreeMap<ElementKey, Box<Liveness>>;
-
-/// The elements that exist as long as others, each with its other.
-pub(crate) type Likes = Vec<(ElementKey, ElementKey)>;
 
 /// Adds the signs of all evidence to the track of its element. Takes the inferences out of the findings, of which
 /// there may be very many.
@@ -38,11 +30,10 @@ pub(crate) fn tracks(
     let mut likes = Likes::new();
     let sent = sent(&findings.inferences);
     // Records of `/rosout` name their nodes themselves.
-    let mut data = findings
-        .streams
-        .iter()
-        .filter(|s| !is_log(s.connection.topic.as_str()));
-    let is_rewritten = data.any(|stream| stream.trust == Reliability::First);
+    let mut streams = findings.streams.iter();
+    let is_rewritten = streams.any(|stream| {
+        stream.trust == Reliability::First && !is_log(stream.connection.topic.as_str())
+    });
     let forwarded = forwarded(findings, traffic);
     let asked = asked(findings, traffic);
     let inferences = std::mem::take(&mut findings.inferences);
@@ -54,9 +45,8 @@ pub(crate) fn tracks(
         let track = tracks.entry(inference.what).or_default();
         track.lasts |= lasts(&inference.when);
         track.evidence = track.evidence.and(Evidence::row(inference.source));
-        track.confidence = track
-            .confidence
-            .min(confidence(&inference, findings, traffic));
+        let confidence = confidence(&inference, findings, traffic);
+        track.confidence = track.confidence.min(confidence);
         match &inference.when {
             Validity::Messages(at) => {
                 let stream = &findings.streams[*at];
@@ -142,13 +132,11 @@ fn forwarded(findings: &Findings, traffic: &Traffic) -> BTreeMap<(Name, Name), (
         stream.map(|s| &s.connection.type_name)
     };
     let ends = |&(node, topic): &(Name, Name)| {
-        let inputs = findings
-            .inferences
-            .iter()
-            .filter_map(|inference| match inference.what {
-                ElementKey::Subscribe(input, of) if of == node && input != topic => Some(input),
-                _ => None,
-            });
+        let all = findings.inferences.iter();
+        let inputs = all.filter_map(|inference| match inference.what {
+            ElementKey::Subscribe(input, of) if of == node && input != topic => Some(input),
+            _ => None,
+        });
         let inputs: BTreeSet<Name> = inputs.filter(|input| kind(*input) == kind(topic)).collect();
         let inputs = || inputs.iter().filter_map(|input| bounds(*input, None));
         let ((first, early), (last, late)) = bounds(topic, Some(node))?;
@@ -164,10 +152,8 @@ fn forwarded(findings: &Findings, traffic: &Traffic) -> BTreeMap<(Name, Name), (
 /// of a node that was there.
 fn asked(findings: &Findings, traffic: &Traffic) -> ById<Name, Option<Stamp>> {
     let senders = || traffic.iter().flatten().flat_map(|of| &of.list);
-    let nodes: BTreeMap<_, Name> = senders()
-        .filter_map(|sender| sender.node)
-        .map(|node| (findings.text(node), node))
-        .collect();
+    let nodes = senders().filter_map(|sender| sender.node);
+    let nodes: BTreeMap<_, Name> = nodes.map(|node| (findings.text(node), node)).collect();
     let mut asked: ById<Name, Option<Stamp>> = ById::default();
     for (topic, of) in traffic.somes() {
         let name = format!("/{}", findings.text(topic).trim_start_matches('/'));
@@ -176,10 +162,8 @@ fn asked(findings: &Findings, traffic: &Traffic) -> ById<Name, Option<Stamp>> {
         };
         let owner = nodes.get(space).filter(|_| lies_in(&name, space));
         let others = of.list.iter().filter(|s| s.node.as_ref() != owner);
-        let first = others
-            .filter_map(|s| Some(s.stretches.first()?.first))
-            .min();
-        if let Some((owner, first)) = owner.zip(first) {
+        let first = others.filter_map(|s| Some(s.stretches.first()?.first));
+        if let Some((owner, first)) = owner.zip(first.min()) {
             let known = asked.grown(*owner).get_or_insert(first);
             *known = first.min(*known);
         }
@@ -203,12 +187,9 @@ fn confidence(inference: &Inference, findings: &Findings, traffic: &Traffic) -> 
 
 /// The streams with a known publisher, whose messages show a publication.
 fn sent(inferences: &[Inference]) -> BTreeSet<usize> {
-    let sent = inferences.iter().filter_map(|inference| match inference {
-        Inference {
-            what: ElementKey::Publish(..),
-            when: Validity::Messages(at),
-            ..
-        } => Some(*at),
+    let edges = inferences.iter().map(|one| (one.what, &one.when));
+    let sent = edges.filter_map(|edge| match edge {
+        (ElementKey::Publish(..), Validity::Messages(at)) => Some(*at),
         _ => None,
     });
     sent.collect()
@@ -216,9 +197,7 @@ fn sent(inferences: &[Inference]) -> BTreeSet<usize> {
 
 /// Whether an inference is from the source of this name.
 fn is_from(inference: &Inference, source: &str) -> bool {
-    SOURCES
-        .get(inference.source)
-        .is_some_and(|s| s.word == source)
+    source_word(inference.source) == source
 }
 
 /// Whether an inference is still valid after its last sign.
@@ -232,9 +211,6 @@ fn together(a: &[Stamp], b: &[Stamp]) -> Vec<Stamp> {
     all.sort_unstable();
     all
 }
-
-/// The most messages of a latched topic: one with more is sent again all the time.
-const LATCHED: u64 = 20;
 
 /// Facts about a stream that is followed.
 struct Followed<'a> {
@@ -303,7 +279,7 @@ pub(crate) fn fall_silent(
         let Some(sender) = merged(traffic, findings, topic) else {
             continue;
         };
-        for (node, stretches) in turns(nodes, sender, findings) {
+        for (node, stretches) in by_publisher(nodes, sender, findings) {
             let end = sender.recording.1.min(findings.mission.1);
             let Some(track) = tracks.get_mut(&ElementKey::Publish(node, topic)) else {
                 continue;
@@ -342,7 +318,7 @@ fn merged<'a>(traffic: &'a Traffic, findings: &Findings, topic: Name) -> Option<
 
 /// The messages of each of the publishers: all of them for a single one; for those of one role, which take turns, those
 /// from its start to the next one's.
-fn turns<'a>(
+fn by_publisher<'a>(
     nodes: &[Name],
     sender: &'a Sender,
     findings: &Findings,
@@ -353,17 +329,16 @@ fn turns<'a>(
     let text = |node: &Name| findings.text(*node);
     let born = |node: &Name| Some((start(&text(node))?, *node));
     let births: Option<Vec<(Stamp, Name)>> = nodes.iter().map(born).collect();
-    let is_one_role = nodes
-        .windows(2)
-        .all(|p| role(&text(&p[0])) == role(&text(&p[1])));
+    let mut pairs = nodes.windows(2);
+    let is_one_role = pairs.all(|p| role(&text(&p[0])) == role(&text(&p[1])));
     let mut births = births.filter(|_| is_one_role).unwrap_or_default();
     births.sort_unstable();
     let ends = births.iter().skip(1).map(|(next, _)| *next);
     let ends = ends.chain([Stamp::MAX]);
-    let turns = births.iter().zip(ends);
-    turns
-        .filter_map(|((from, node), to)| Some((*node, within(&sender.stretches, *from, to)?)))
-        .collect()
+    let own = |((from, node), to): (&(Stamp, Name), Stamp)| {
+        Some((*node, within(&sender.stretches, *from, to)?))
+    };
+    births.iter().zip(ends).filter_map(own).collect()
 }
 
 /// The stretches of a turn; `None` if one continues into the next turn, so that two publish at the same time.

@@ -70,7 +70,8 @@ impl<'a> JsonColumns<'a> {
             all.jitter_s.push(row.jitter.value());
             all.age_s.push(row.age.value());
             all.hz.push(JsonRate::of(&row));
-            all.lifecycle.push(graphs.lifecycle(&row).map(Text::from));
+            all.lifecycle
+                .push(graphs.lifecycle(&row).map(|word| Text::from(&**word)));
         }
         all
     }
