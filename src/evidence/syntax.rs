@@ -21,7 +21,7 @@ pub(crate) struct Parsed {
 /// hundredth of them. Parsing of maliciously slow text is abandoned, by counting work instead of time.
 const BREATHS_PER_BYTE: usize = 4;
 
-/// The deepest nesting of elements that is visited: real code stays below a hundred.
+/// The deepest nesting of elements that is visited: real code stays below a hundred, and readers keep a class per level.
 const DEEPEST: usize = 400;
 
 impl Parsed {

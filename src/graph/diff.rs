@@ -140,7 +140,8 @@ pub fn apply(before: &Graph, diff: &Diff) -> Graph {
 
 // Reconfigurations from differences: thresholds for rates, hand-overs, and hints from the evidence.
 
-/// The default share by which a rate must change to count as changed.
+/// The default share by which a rate must change to count as changed: nodes under load vary by a tenth, and a camera that is switched
+/// to another mode changes by a third at least.
 pub const RATE_CHANGE: f64 = 0.25;
 
 /// A finder of the reconfigurations of a mission, window by window in order.
@@ -301,13 +302,15 @@ impl<'a> Changes<'a> {
     }
 }
 
-/// The fewest messages in the busier of two windows for a meaningful rate.
+/// The fewest messages in the busier of two windows for a meaningful rate: of three or fewer, one that falls into the next window is
+/// a change by a third.
 const FEW: f64 = 3.5;
 
-/// The ratio of the longest gap to the median period from which on a topic counts as irregular.
+/// The ratio of the longest gap to the median period from which on a topic counts as irregular: two lost messages in a row make three.
 const UNSTEADY: f64 = 4.0;
 
-/// The share of the time that the median period must cover, message by message, for a topic to be regular.
+/// The share of the time that the median period must cover, message by message, for a topic to be regular. Topics that send bursts
+/// cover a few hundredths; with a third of the messages lost, an even one still covers two thirds.
 const COVERED: f64 = 0.6;
 
 /// Whether a rate changed: by more than the share `threshold` of its earlier value, by more than the two

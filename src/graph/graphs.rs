@@ -267,7 +267,7 @@ impl Number {
     }
 }
 
-/// The number below which integers are exact in a float.
+/// The number below which integers are exact in a float, 2^53, rounded down.
 const EXACT: f64 = 9e15;
 
 /// The state of one element in one window.

@@ -332,7 +332,7 @@ pub(crate) fn all_silent(senders: &[&[Stretch]], lives: &[Span], pauses: &[Span]
 }
 
 /// The most pauses that are kept for each topic; any part of the mission contains one of them, or no pause
-/// longer than those within windows.
+/// longer than those within windows. They are in the JSON of every topic, so that more would make files larger.
 const PAUSES: usize = 32;
 
 /// The longest pauses of one sequence of messages, collected message by message.

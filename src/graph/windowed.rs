@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use crate::base::cast;
 use crate::base::error::Result;
+use crate::base::ids::Few;
 use crate::base::name::is_quiet;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Confidence;
@@ -48,7 +49,7 @@ pub(crate) fn graphs(
         findings,
         history,
         published: BTreeMap::new(),
-        sent: ById::default(),
+        sent: Few::default(),
     };
     all.topics(recorded).map_err(spool_error)?;
     all.nodes();
@@ -80,7 +81,7 @@ struct GraphAssembly<'a> {
     /// The messages of each known publisher on each topic, in windows with any.
     published: BTreeMap<(Name, Name), Column>,
     /// The messages of each known publisher per window.
-    sent: ById<Name, Vec<Sent>>,
+    sent: Few<Name, Vec<Sent>>,
 }
 
 /// The messages of a node in one window.
@@ -147,7 +148,7 @@ impl GraphAssembly<'_> {
         streams: &[usize],
         sums: &[Sums],
     ) -> io::Result<()> {
-        let mut of: ById<Name, Vec<usize>> = ById::default();
+        let mut of: Few<Name, Vec<usize>> = Few::default();
         for stream in streams {
             if let Some(node) = sender(&self.findings.streams[*stream]) {
                 of.grown(node).push(*stream);
@@ -596,7 +597,7 @@ struct OpenWindow {
     gaps: Vec<i64>,
 }
 
-/// The most gaps kept per window for their median (8 MB); a window with more has no median.
+/// The most gaps kept per window for their median (8 MB); a window with more has no median: 1 kHz for 17 minutes.
 const MOST_GAPS: usize = 1 << 20;
 
 /// Counts the messages of some streams, those of a topic or of one of its publishers: each window with messages, in order.

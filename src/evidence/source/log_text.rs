@@ -26,21 +26,21 @@ pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
         _ => Observation::SaysSubscribe(node, of),
     };
     context.states(observation, String::new);
-    if let (None, Some((publishes, _))) = (bridged, named) {
-        if record.text.contains("incompatible QoS") {
-            let policy = record.text.split_once("incompatible policy: ");
-            let policy = policy.map_or("", |(_, rest)| rest.trim_end_matches(['.', ' ']));
-            let policy = policy.trim_end_matches("_QOS_POLICY").to_lowercase();
-            let policy = context.name(&policy);
-            let observation = if publishes {
-                Observation::Starves(node, of, policy)
-            } else {
-                Observation::Starved(node, of, policy)
-            };
-            context.states(observation, || {
-                format!("{} logs: {}", record.logger, record.text)
-            });
-        }
+    if let (None, Some((publishes, _))) = (bridged, named)
+        && record.text.contains("incompatible QoS")
+    {
+        let policy = record.text.split_once("incompatible policy: ");
+        let policy = policy.map_or("", |(_, rest)| rest.trim_end_matches(['.', ' ']));
+        let policy = policy.trim_end_matches("_QOS_POLICY").to_lowercase();
+        let policy = context.name(&policy);
+        let observation = if publishes {
+            Observation::Starves(node, of, policy)
+        } else {
+            Observation::Starved(node, of, policy)
+        };
+        context.states(observation, || {
+            format!("{} logs: {}", record.logger, record.text)
+        });
     }
 }
 

@@ -29,7 +29,8 @@ const SHARE: u64 = 90;
 /// The least ratio of the number of times that the input comes first to that of the output: the recorder receives some
 /// copies before their originals, but not most of them.
 const FIRST: u64 = 3;
-/// The most flows that have a content at once; with more it is a constant.
+/// The most flows that have a content at once; with more it is a constant, such as an empty array, and the work would be the square
+/// of their number.
 const MOST_AT_ONCE: usize = 32;
 /// The most runs of a flow that are kept: a mux that switches more often forwards several inputs at once.
 const MOST_RUNS: usize = 4096;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::base::ids::ById;
+use crate::base::ids::Few;
 use crate::base::name::is_recorder;
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind, Inference, Validity};
@@ -86,7 +86,7 @@ pub(crate) fn read_lost(
 
 /// Adds the losses; consecutive reports are combined.
 pub(crate) fn conclude_lost(source: SourceId, known: &mut Conclusions<'_>) {
-    let mut lost: ById<Name, Vec<(Stamp, u64)>> = ById::default();
+    let mut lost: Few<Name, Vec<(Stamp, u64)>> = Few::default();
     for fact in known.facts.list.clone() {
         if let Observation::Lost(topic, many) = fact.observation
             && known.is_recorded(topic)

@@ -5,6 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
+use crate::base::ids::Few;
 use crate::base::rhythm::{
     ADVERTISED_NS, BREAK, BREAK_NS, DISCOVERY_NS, FEWEST, FOUND_NS, GONE_NS, REGISTRATION_NS,
     SHUTDOWN_NS, UNUSUAL,
@@ -13,7 +14,6 @@ use crate::base::time::{Span, Stamp};
 use crate::evidence::inference::ElementKey;
 use crate::evidence::observation::Name;
 use crate::evidence::{Confidence, Evidence};
-use crate::graph::ById;
 use crate::graph::history::restarts::{Restart, Restarts};
 use crate::graph::history::{Bound, Stretch, hide};
 
@@ -35,7 +35,7 @@ pub(crate) fn compute_lifetimes(
     restarts: &Restarts,
     mission: (Stamp, Stamp),
 ) {
-    let mut closed: ById<Name, Option<Option<Stamp>>> = ById::default();
+    let mut closed: BTreeMap<Name, Option<Stamp>> = BTreeMap::new();
     // An edge that exists as long as its node is evidence for its topic, but not for the node.
     let of_nodes = likes
         .iter()
@@ -53,7 +53,7 @@ pub(crate) fn compute_lifetimes(
         let [Some(node), Some(topic)] = what.ends() else {
             continue;
         };
-        let last = closed.grown(node).get_or_insert(Some(Stamp::MIN));
+        let last = closed.entry(node).or_insert(Some(Stamp::MIN));
         *last = last.and_then(|last| track.closed(last));
         let learner = tracks.entry(ElementKey::Node(node)).or_default();
         if followers.contains(what)
@@ -68,7 +68,7 @@ pub(crate) fn compute_lifetimes(
         known.know(track, is_recorded(what));
     }
     // A node ended if its last connection was closed and it has no later sign.
-    for (node, end) in closed.somes() {
+    for (node, end) in closed {
         let end = end.filter(|end| *end > Stamp::MIN);
         if let (Some(end), Some(track)) = (end, tracks.get_mut(&ElementKey::Node(node)))
             && track.signs.iter().all(|sign| *sign <= end)
@@ -84,8 +84,8 @@ pub(crate) fn compute_lifetimes(
             }
         }
     }
-    let mut of_topics: ById<Name, Vec<Lifetime>> = ById::default();
-    let mut of_recorders: ById<Name, Vec<Lifetime>> = ById::default();
+    let mut of_topics: Few<Name, Vec<Lifetime>> = Few::default();
+    let mut of_recorders: Few<Name, Vec<Lifetime>> = Few::default();
     let mut recorded: Vec<ElementKey> = Vec::new();
     for (what, track) in &mut edges {
         let [Some(node), Some(topic)] = what.ends() else {

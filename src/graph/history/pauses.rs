@@ -57,7 +57,7 @@ impl SendingNode<'_> {
 }
 
 /// The most gaps of a sender of which any may be a pause of the recorder: one with more only publishes when
-/// needed.
+/// needed, and each is compared with all senders. Nobody pauses a recorder more often.
 const MOST_GAPS: usize = 64;
 
 /// The times at which nothing was recorded, sorted: nearly all senders of a recording pause together, and

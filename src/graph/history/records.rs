@@ -6,6 +6,7 @@ use std::io;
 use std::sync::Arc;
 
 use crate::base::error::Result;
+use crate::base::ids::Few;
 use crate::base::role::role;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::{Recorded, spool_error};
@@ -207,8 +208,8 @@ fn roomy(tracks: &Tracks) -> History {
 }
 
 /// The messages that each node sends, without latched ones.
-fn sent(traffic: &Traffic) -> ById<Name, Vec<&TopicSender>> {
-    let mut sent: ById<Name, Vec<&TopicSender>> = ById::default();
+fn sent(traffic: &Traffic) -> Few<Name, Vec<&TopicSender>> {
+    let mut sent: Few<Name, Vec<&TopicSender>> = Few::default();
     let senders = traffic.iter().flatten().flat_map(|of| &of.list);
     for sender in senders.filter(|sender| !sender.latched) {
         if let Some(node) = sender.node {
@@ -225,7 +226,7 @@ struct Assembly<'a> {
     /// The number of known publishers of each topic.
     publishers: ById<Name, u32>,
     /// The messages that each node sends, without latched ones.
-    sent: ById<Name, Vec<&'a TopicSender>>,
+    sent: Few<Name, Vec<&'a TopicSender>>,
 }
 
 impl Assembly<'_> {

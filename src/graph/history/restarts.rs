@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use crate::base::error::Result;
+use crate::base::ids::Few;
 use crate::base::name::is_log;
 use crate::base::rhythm::{FEWEST, GAP, GAP_NS};
 use crate::base::time::Stamp;
@@ -14,7 +15,6 @@ use crate::evidence::conclude::Findings;
 use crate::evidence::inference::{Inference, Reliability, Validity};
 use crate::evidence::numbers::Number;
 use crate::evidence::observation::Name;
-use crate::graph::ById;
 use crate::graph::history::Stretch;
 use crate::graph::history::senders::{Sender, Traffic};
 
@@ -26,12 +26,13 @@ pub(crate) struct Restart {
 }
 
 /// Restarts by node, sorted by time.
-pub(crate) type Restarts = ById<Name, Vec<Restart>>;
+pub(crate) type Restarts = Few<Name, Vec<Restart>>;
 
 /// The most messages of a latched topic: one with more is sent again all the time, so that a repetition shows nothing.
+/// A map is sent once per start; with more, parameters that are republished every few seconds would be restarts.
 pub(super) const LATCHED: u64 = 20;
 /// The most gaps, of all nodes together, around which numbers are requested: each requires reading two
-/// chunks.
+/// chunks, so that so many take a second. Missions have a few dozen gaps.
 const MOST_ASKED: usize = 256;
 
 /// A stream of a node, and the messages on its topic.
@@ -80,8 +81,8 @@ impl Own<'_> {
 }
 
 /// The streams of each publisher with a reliable name.
-fn own_streams<'a>(findings: &Findings, traffic: &'a Traffic) -> ById<Name, Vec<Own<'a>>> {
-    let mut own: ById<Name, Vec<Own<'a>>> = ById::default();
+fn own_streams<'a>(findings: &Findings, traffic: &'a Traffic) -> Few<Name, Vec<Own<'a>>> {
+    let mut own: Few<Name, Vec<Own<'a>>> = Few::default();
     for (topic, all) in traffic.somes() {
         let mut streams: Vec<Vec<usize>> = vec![Vec::new(); all.list.len()];
         for (at, of) in all.streams.iter().zip(&all.of) {
@@ -177,7 +178,7 @@ pub(crate) fn unread(
     traffic: &Traffic,
 ) -> Result<BTreeSet<(usize, Stamp)>> {
     let mut asked = BTreeSet::new();
-    for own in &own_streams(findings, traffic) {
+    for (_, own) in own_streams(findings, traffic).with_ids() {
         let is_unread = |at: &&usize| {
             let read = recorded.numbers.some(**at).map(|numbers| numbers.read);
             read.is_some_and(|read| read < recorded.messages.count(recorded.streams[**at].times))
@@ -216,8 +217,8 @@ pub(crate) fn restarts(
         nodes.grown(*node).clear();
     }
     let falls = nodes.with_ids();
-    let falls = falls.map(|(node, own)| falls_of(recorded, findings, node, own));
-    let falls: ById<Name, Vec<Fall>> = falls.collect::<io::Result<_>>()?;
+    let falls = falls.map(|(node, own)| Ok((node, falls_of(recorded, findings, node, own)?)));
+    let falls: Few<Name, Vec<Fall>> = falls.collect::<io::Result<_>>()?;
     let mut alike: BTreeMap<_, Vec<(Name, &Fall)>> = BTreeMap::new();
     for (node, of) in falls.with_ids() {
         for fall in of.iter().filter(|fall| fall.first.stamp != 0) {
@@ -231,7 +232,7 @@ pub(crate) fn restarts(
             let mut alike = alike.get(&fall.header()).into_iter().flatten();
             alike.any(|(other, of)| *other != node && fall.is_later_than(of))
         };
-        let own_falls = falls[node].iter().filter(|fall| !is_copy(fall));
+        let own_falls = falls.of(node).iter().filter(|fall| !is_copy(fall));
         let mut breaks: Vec<_> = own_falls.map(|fall| (fall.from, fall.to)).collect();
         breaks.extend(sent_again(recorded, own)?);
         let mut breaks = narrowed(breaks);
@@ -363,8 +364,8 @@ fn between_records(
 }
 
 /// All statements about each node.
-fn said(inferences: &[Inference]) -> ById<Name, Vec<&Inference>> {
-    let mut of: ById<Name, Vec<&Inference>> = ById::default();
+fn said(inferences: &[Inference]) -> Few<Name, Vec<&Inference>> {
+    let mut of: Few<Name, Vec<&Inference>> = Few::default();
     for inference in inferences {
         if let [Some(node), _] = inference.what.ends() {
             of.grown(node).push(inference);

@@ -125,7 +125,8 @@ struct SenderTimes {
     passed: usize,
 }
 
-/// The most times kept per sender (32 MB); of more, every second one is dropped.
+/// The most times kept per sender (32 MB); of more, every second one is dropped: an IMU of 1 kHz reaches it after 70 minutes, and
+/// its rate is as clear from half of them.
 const MOST_TIMES: usize = 1 << 22;
 /// The silence after which a message is kept in any case, and the one before it, in nanoseconds: half of the shortest gap, so
 /// that no gap is lost.
@@ -205,7 +206,8 @@ const DEPTH: usize = 8;
 /// The least gain in log likelihood of a rate change over chance: 3 standard deviations of a normal
 /// distribution are 3²/2 in log likelihood, doubled because of the many possible positions.
 const GAIN: f64 = 9.0;
-/// The most gaps of a sender with a rhythm; after more, the rest of its messages is one stretch.
+/// The most gaps of a sender with a rhythm; after more, the rest of its messages is one stretch: it has none, and each stretch is
+/// compared with those of all others.
 const MOST_GAPS: usize = 4096;
 
 /// Divides sorted times into stretches of even messages.

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
+use crate::base::ids::Few;
 use crate::base::name::{is_feedback, is_log, lies_in};
 use crate::base::rhythm::{CROWD_NS, FOUND_NS, broken_after};
 use crate::base::role::{role, start};
@@ -12,7 +13,6 @@ use crate::evidence::conclude::Findings;
 use crate::evidence::inference::{ElementKey, Inference, Reliability, Validity};
 use crate::evidence::observation::Name;
 use crate::evidence::{Confidence, Evidence, SOURCES, source_word};
-use crate::graph::ById;
 use crate::graph::history::lifetimes::{Extent, Likes, Liveness, Pulse, Tracks};
 use crate::graph::history::restarts::{LATCHED, Restart, Restarts};
 use crate::graph::history::senders::{Sender, Senders, Traffic};
@@ -62,7 +62,7 @@ pub(crate) fn tracks(
                     known: node.is_none() && sent.contains(at),
                     begins: !is_free && !with_start,
                     beats: !is_free && !with_end,
-                    asked: node.and_then(|node| asked.some(node)).copied(),
+                    asked: node.and_then(|node| asked.get(&node)).copied(),
                     restarts: own,
                     pauses,
                 };
@@ -150,11 +150,11 @@ fn forwarded(findings: &Findings, traffic: &Traffic) -> BTreeMap<(Name, Name), (
 
 /// When others sent the first message to each node, on a topic below its name: what it sends at once is the answer
 /// of a node that was there.
-fn asked(findings: &Findings, traffic: &Traffic) -> ById<Name, Option<Stamp>> {
+fn asked(findings: &Findings, traffic: &Traffic) -> BTreeMap<Name, Stamp> {
     let senders = || traffic.iter().flatten().flat_map(|of| &of.list);
     let nodes = senders().filter_map(|sender| sender.node);
     let nodes: BTreeMap<_, Name> = nodes.map(|node| (findings.text(node), node)).collect();
-    let mut asked: ById<Name, Option<Stamp>> = ById::default();
+    let mut asked: BTreeMap<Name, Stamp> = BTreeMap::new();
     for (topic, of) in traffic.somes() {
         let name = format!("/{}", findings.text(topic).trim_start_matches('/'));
         let Some((space, _)) = name.rsplit_once('/') else {
@@ -164,7 +164,7 @@ fn asked(findings: &Findings, traffic: &Traffic) -> ById<Name, Option<Stamp>> {
         let others = of.list.iter().filter(|s| s.node.as_ref() != owner);
         let first = others.filter_map(|s| Some(s.stretches.first()?.first));
         if let Some((owner, first)) = owner.zip(first.min()) {
-            let known = asked.grown(*owner).get_or_insert(first);
+            let known = asked.entry(*owner).or_insert(first);
             *known = first.min(*known);
         }
     }
@@ -298,8 +298,8 @@ pub(crate) fn fall_silent(
 }
 
 /// The known publishers of each topic.
-fn publishers(tracks: &Tracks) -> ById<Name, Vec<Name>> {
-    let mut all: ById<Name, Vec<Name>> = ById::default();
+fn publishers(tracks: &Tracks) -> Few<Name, Vec<Name>> {
+    let mut all: Few<Name, Vec<Name>> = Few::default();
     for what in tracks.keys() {
         if let ElementKey::Publish(node, topic) = what {
             all.grown(*topic).push(*node);

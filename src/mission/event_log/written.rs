@@ -162,9 +162,10 @@ fn chosen(mission: &Mission, options: LogOptions) -> Vec<LogRow<'_>> {
 }
 
 /// The largest uncertainty of a time that is written as exact, in nanoseconds: a recorder looks for new topics once a
-/// second.
+/// second, and finds a node within 2.5 s of its start, so that nearly every start is within it.
 const SURE_NS: i64 = 4_000_000_000;
-/// The largest uncertainty of a time that is written as "about", in nanoseconds; with more, it is written as a range.
+/// The largest uncertainty of a time that is written as "about", in nanoseconds; with more, it is written as a range, since a second
+/// in the middle of it would be taken for the time.
 const ABOUT_NS: i64 = 10_000_000_000;
 
 /// The time of an event, counted from the mission's start: `00:37.9`, `~00:37`, or `00:35–00:58`.

@@ -87,7 +87,13 @@ fn tree(name: &str, given: &Arguments) -> Option<Tree> {
         "LoadComposableNodes" => element("load_composable_node", &[]),
         "IncludeLaunchDescription" => include(given),
         "GroupAction" => element("group", &[("scoped", text(9, "scoped"))]),
-        "TimerAction" | "RegisterEventHandler" => unscoped(),
+        "TimerAction"
+        | "RegisterEventHandler"
+        | "OnProcessExit"
+        | "OnProcessStart"
+        | "OnProcessIO"
+        | "OnExecutionComplete"
+        | "OnStateTransition" => unscoped(),
         "PushRosNamespace" | "PushROSNamespace" => {
             element("push_ros_namespace", &[("namespace", text(0, "namespace"))])
         }
@@ -103,11 +109,6 @@ fn tree(name: &str, given: &Arguments) -> Option<Tree> {
                 ("default", text(1, "default_value")),
             ],
         ),
-        "OnProcessExit"
-        | "OnProcessStart"
-        | "OnProcessIO"
-        | "OnExecutionComplete"
-        | "OnStateTransition" => unscoped(),
         "IfCondition" => element("condition", &[("if", text(0, "predicate_expression"))]),
         "UnlessCondition" => element("condition", &[("unless", text(0, "predicate_expression"))]),
         "LaunchConfigurationEquals" | "LaunchConfigurationNotEquals" => {
