@@ -211,8 +211,9 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
     let mut found = Vec::new();
     for (at, bag) in filled.iter().copied().enumerate() {
         let mut before = filled[..at].iter().copied();
-        let apart = before.find_map(|other| Some((other, apart(&bags[other], &bags[bag])?)));
-        if let Some((other, (ahead, messages))) = apart
+        let found_offset =
+            before.find_map(|other| Some((other, offset(&bags[other], &bags[bag])?)));
+        if let Some((other, (ahead, messages))) = found_offset
             && ahead.abs() > NEAR_NS
         {
             found.push(ClockOffset {
@@ -227,7 +228,7 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
 }
 
 /// The delay of the common messages in the second recording, and their number; `None` without agreement.
-fn apart(one: &Contents<'_>, other: &Contents<'_>) -> Option<(i64, usize)> {
+fn offset(one: &Contents<'_>, other: &Contents<'_>) -> Option<(i64, usize)> {
     let both = other.iter().filter_map(|(key, time)| {
         let before = one.get(key)?.as_ref()?;
         Some((time.as_ref()?.since(*before), key.0))
@@ -362,16 +363,16 @@ mod tests {
         fn an_offset_needs_messages_that_agree() {
             let one: Vec<i64> = (0..20).map(|n| n * 100).collect();
             let later: Vec<i64> = one.iter().map(|t| t + 350 + t % 7).collect();
-            let (ahead, messages) = apart(&contents(&one), &contents(&later)).unwrap();
+            let (ahead, messages) = offset(&contents(&one), &contents(&later)).unwrap();
             assert_eq!((ahead / 10_000_000, messages), (35, 20));
             let wild: Vec<i64> = one.iter().map(|t| t * 2).collect();
-            assert_eq!(apart(&contents(&one), &contents(&wild)), None);
-            assert_eq!(apart(&contents(&one[..5]), &contents(&later)), None);
+            assert_eq!(offset(&contents(&one), &contents(&wild)), None);
+            assert_eq!(offset(&contents(&one[..5]), &contents(&later)), None);
             let only = |mut all: Contents<'static>| {
                 all.retain(|key, _| key.0 == "/tf");
                 all
             };
-            assert_eq!(apart(&only(contents(&one)), &only(contents(&later))), None);
+            assert_eq!(offset(&only(contents(&one)), &only(contents(&later))), None);
         }
     }
 }

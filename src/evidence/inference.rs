@@ -765,7 +765,7 @@ pub(crate) enum IncidentKind {
     /// The recorder lost so many messages.
     Lost(u64),
     /// A node that forwarded the messages of one topic now forwards those of another.
-    Turn(Name, Name),
+    Switch(Name, Name),
 }
 
 /// A statement about an element.

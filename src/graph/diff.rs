@@ -213,7 +213,7 @@ impl<'a> Changes<'a> {
 
     fn rates(&self, diff: &Diff, graph: &Graph, spans: (Span, Span), changes: &mut Vec<Change>) {
         let mut steady = BTreeSet::new();
-        let crowded = self.crowded(graph);
+        let shared = self.shared(graph);
         for (old, new) in &diff.changed {
             let is_rated = match new.what {
                 Element::Topic(id) => {
@@ -224,7 +224,7 @@ impl<'a> Changes<'a> {
                 Element::Publish(id) => {
                     let topic = self.elements.publishes[id].topic;
                     // With one publisher the topic's own change is sufficient.
-                    crowded.contains(&topic) && steady.contains(&topic)
+                    shared.contains(&topic) && steady.contains(&topic)
                 }
                 Element::Node(_) | Element::Subscribe(_) => false,
             };
@@ -265,7 +265,7 @@ impl<'a> Changes<'a> {
     }
 
     /// Topics with more than one publisher in this graph.
-    fn crowded(&self, graph: &Graph) -> BTreeSet<TopicId> {
+    fn shared(&self, graph: &Graph) -> BTreeSet<TopicId> {
         let mut seen = BTreeSet::new();
         let topics = graph.publishes();
         let topics = topics.map(|(id, _)| self.elements.publishes[id].topic);

@@ -70,7 +70,7 @@ impl Graphs {
     }
 
     /// The indices of the windows from which an element exists (`true`) or no longer exists.
-    pub(crate) fn turns(&self, what: Element) -> Vec<(usize, bool)> {
+    pub(crate) fn presence_changes(&self, what: Element) -> Vec<(usize, bool)> {
         let mut found = Vec::new();
         let Some(mut cursor) = self.cursor(what) else {
             return found;

@@ -3,16 +3,16 @@
 //!
 //! In: everything recorded, and the findings. Out: a [`History`], made once, from which windows, events, phases and figures
 //! are derived; nothing here depends on windows. Begin with `records`, which calls the others in order: `senders` reads the
-//! times of every topic, `restarts` and `pauses` find restarts and the pauses of `recordings` in them, `tracks` collects the signs
+//! times of every topic, `restarts` and `pauses` find restarts and the pauses of `recordings` in them, `liveness` collects the signs
 //! of each element, `lifetimes` decides when it existed.
 
 mod lifetimes;
+mod liveness;
 mod pauses;
 mod recordings;
 pub(crate) mod records;
 mod restarts;
 pub(crate) mod senders;
-mod tracks;
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

@@ -191,9 +191,9 @@ pub fn divide(division: &Division, span: Span) -> Result<Windows> {
     })
 }
 
-/// The windows that begin at the start of `span` and at each of `turns`, sorted; none of them is partial.
-pub(crate) fn at_turns(span: Span, turns: impl Iterator<Item = Stamp>) -> Windows {
-    let mut spans = cut_at(span, turns);
+/// The windows that begin at the start of `span` and at each of `changes`, sorted; none of them is partial.
+pub(crate) fn at_changes(span: Span, changes: impl Iterator<Item = Stamp>) -> Windows {
+    let mut spans = cut_at(span, changes);
     spans.retain(|window| window.start < window.end);
     let shortest = spans.iter().map(Span::nanos).min().unwrap_or(1);
     let period = Period::from_nanos(shortest.max(1)).unwrap_or(MINUTE);

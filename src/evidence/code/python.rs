@@ -192,29 +192,29 @@ impl<'a> PythonReader<'a> {
     /// The values of the variables of the loops around an element, for each iteration; a single empty entry
     /// outside of loops.
     fn iterations(&self, node: Node<'a>) -> Vec<BTreeMap<&'a str, Node<'a>>> {
-        let mut turns = vec![BTreeMap::new()];
+        let mut iterations = vec![BTreeMap::new()];
         let around = self.loops.iter();
         for (_, left, right) in around.filter(|(body, ..)| body.contains(&node.start_byte())) {
             let items = self.items(*right, 0);
-            if items.is_empty() || items.len() * turns.len() > MOST_ITERATIONS {
+            if items.is_empty() || items.len() * iterations.len() > MOST_ITERATIONS {
                 continue;
             }
-            let with = |turn: &BTreeMap<&'a str, Node<'a>>, item: Node<'a>| {
-                let mut turn = turn.clone();
+            let with = |iteration: &BTreeMap<&'a str, Node<'a>>, item: Node<'a>| {
+                let mut iteration = iteration.clone();
                 if left.kind() == "identifier" {
-                    turn.insert(self.text(*left), item);
+                    iteration.insert(self.text(*left), item);
                 } else {
                     let names = children(*left).into_iter().map(|name| self.text(name));
-                    turn.extend(names.zip(parts(item)));
+                    iteration.extend(names.zip(parts(item)));
                 }
-                turn
+                iteration
             };
-            let next = turns
+            let next = iterations
                 .iter()
-                .flat_map(|turn| items.iter().map(move |item| with(turn, *item)));
-            turns = next.collect();
+                .flat_map(|iteration| items.iter().map(move |item| with(iteration, *item)));
+            iterations = next.collect();
         }
-        turns
+        iterations
     }
 
     /// The items of the literal that a loop iterates over, or of the one that a name refers to.

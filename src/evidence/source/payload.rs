@@ -102,7 +102,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         }
         known.copies.insert((node, basis));
         let inputs = nearest(&matches, output, &inputs);
-        turns(source, known, &flows, &matches, (output, &inputs));
+        switches(source, known, &flows, &matches, (output, &inputs));
         for input in inputs {
             let topic = flows[input].0;
             let what = ElementKey::Subscribe(topic, node);
@@ -118,7 +118,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
 }
 
 /// Adds the times at which a mux switches to another of its inputs.
-fn turns(
+fn switches(
     source: SourceId,
     known: &mut Conclusions<'_>,
     flows: &[PayloadFlow],
@@ -135,7 +135,7 @@ fn turns(
     {
         let [from, to] = [pair[0], pair[1]].map(|run| flows[run.input].0);
         let what = ElementKey::Topic(flows[output].0);
-        known.incident(source, what, IncidentKind::Turn(from, to), pair[1].first);
+        known.incident(source, what, IncidentKind::Switch(from, to), pair[1].first);
     }
 }
 
@@ -377,8 +377,8 @@ fn select(
         return;
     }
     for pair in inputs.windows(2).filter(|pair| pair[0].1 != pair[1].1) {
-        let turn = IncidentKind::Turn(pair[0].1, pair[1].1);
-        known.incident(source, what, turn, pair[1].0);
+        let switch = IncidentKind::Switch(pair[0].1, pair[1].1);
+        known.incident(source, what, switch, pair[1].0);
     }
 }
 

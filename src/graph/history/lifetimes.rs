@@ -20,7 +20,7 @@ use crate::graph::history::{Bound, Stretch, hide};
 /// The signs and lifetimes of every element.
 ///
 /// Boxed, since the tree reserves much unused memory.
-pub(crate) type Tracks = BTreeMap<ElementKey, Box<Liveness>>;
+pub(crate) type LivenessOf = BTreeMap<ElementKey, Box<Liveness>>;
 
 /// The elements that exist as long as others, each with its other.
 pub(crate) type Likes = Vec<(ElementKey, ElementKey)>;
@@ -30,7 +30,7 @@ const FIRST_EDGE: ElementKey = ElementKey::Publish(Name(0), Name(0));
 
 /// Computes all lifetimes; `mission` contains the first and last moments.
 pub(crate) fn compute_lifetimes(
-    tracks: &mut Tracks,
+    liveness_of: &mut LivenessOf,
     likes: &[(ElementKey, ElementKey)],
     restarts: &Restarts,
     mission: (Stamp, Stamp),
@@ -41,78 +41,80 @@ pub(crate) fn compute_lifetimes(
         .iter()
         .filter(|(_, other)| matches!(other, ElementKey::Node(_)));
     let followers: BTreeSet<ElementKey> = of_nodes.map(|(what, _)| *what).collect();
-    let mut edges = tracks.split_off(&FIRST_EDGE);
+    let mut edges = liveness_of.split_off(&FIRST_EDGE);
     // A recorder subscribes to topics because they exist, so its subscriptions do not show how long they do.
-    let nodes = tracks.iter().filter_map(|(what, track)| match what {
-        ElementKey::Node(node) if track.evidence.has("recorder") => Some(*node),
-        _ => None,
-    });
+    let nodes = liveness_of
+        .iter()
+        .filter_map(|(what, liveness)| match what {
+            ElementKey::Node(node) if liveness.evidence.has("recorder") => Some(*node),
+            _ => None,
+        });
     let recorders: BTreeSet<Name> = nodes.collect();
     let is_recorded = |what: &ElementKey| matches!(what, ElementKey::Subscribe(_, node) if recorders.contains(node));
-    for (what, track) in &edges {
+    for (what, liveness) in &edges {
         let [Some(node), Some(topic)] = what.ends() else {
             continue;
         };
         let last = closed.entry(node).or_insert(Some(Stamp::MIN));
-        *last = last.and_then(|last| track.closed(last));
-        let learner = tracks.entry(ElementKey::Node(node)).or_default();
+        *last = last.and_then(|last| liveness.closed(last));
+        let learner = liveness_of.entry(ElementKey::Node(node)).or_default();
         if followers.contains(what)
-            && track.signs.is_empty()
-            && track.confidence > Confidence::Stated
+            && liveness.signs.is_empty()
+            && liveness.confidence > Confidence::Stated
         {
-            learner.evidence = learner.evidence.and(track.evidence);
+            learner.evidence = learner.evidence.and(liveness.evidence);
         } else {
-            learner.learn(track);
+            learner.learn(liveness);
         }
-        let known = tracks.entry(ElementKey::Topic(topic)).or_default();
-        known.know(track, is_recorded(what));
+        let known = liveness_of.entry(ElementKey::Topic(topic)).or_default();
+        known.know(liveness, is_recorded(what));
     }
     // A node ended if its last connection was closed and it has no later sign.
     for (node, end) in closed {
         let end = end.filter(|end| *end > Stamp::MIN);
-        if let (Some(end), Some(track)) = (end, tracks.get_mut(&ElementKey::Node(node)))
-            && track.signs.iter().all(|sign| *sign <= end)
+        if let (Some(end), Some(liveness)) = (end, liveness_of.get_mut(&ElementKey::Node(node)))
+            && liveness.signs.iter().all(|sign| *sign <= end)
         {
-            track.ends.push(end);
+            liveness.ends.push(end);
         }
     }
-    for (what, track) in tracks.iter_mut() {
+    for (what, liveness) in liveness_of.iter_mut() {
         if let ElementKey::Node(node) = what {
-            track.live(mission, true);
+            liveness.live(mission, true);
             for restart in restarts.of(*node) {
-                track.restart(restart);
+                liveness.restart(restart);
             }
         }
     }
     let mut of_topics: Few<Name, Vec<Lifetime>> = Few::default();
     let mut of_recorders: Few<Name, Vec<Lifetime>> = Few::default();
     let mut recorded: Vec<ElementKey> = Vec::new();
-    for (what, track) in &mut edges {
+    for (what, liveness) in &mut edges {
         let [Some(node), Some(topic)] = what.ends() else {
             continue;
         };
-        let around = tracks.get(&ElementKey::Node(node));
-        track.live_within(&around.map(|t| Rc::clone(&t.lives)).unwrap_or_default());
+        let around = liveness_of.get(&ElementKey::Node(node));
+        liveness.live_within(&around.map(|t| Rc::clone(&t.lives)).unwrap_or_default());
         if is_recorded(what) {
-            add_lives(of_recorders.grown(topic), &track.lives);
+            add_lives(of_recorders.grown(topic), &liveness.lives);
             recorded.push(*what);
         } else {
-            add_lives(of_topics.grown(topic), &track.lives);
+            add_lives(of_topics.grown(topic), &liveness.lives);
         }
     }
-    tracks.append(&mut edges);
-    live_like(tracks, likes, false, |what, lives| {
+    liveness_of.append(&mut edges);
+    live_like(liveness_of, likes, false, |what, lives| {
         if let [_, Some(topic)] = what.ends() {
             add_lives(of_topics.grown(topic), lives);
         }
     });
-    for (what, track) in tracks.iter_mut() {
+    for (what, liveness) in liveness_of.iter_mut() {
         if let ElementKey::Topic(topic) = what {
             let edges = std::mem::take(of_topics.grown(*topic));
-            track.live(mission, false);
-            track.live_with(edges);
-            if track.lives.is_empty() {
-                track.live_with(std::mem::take(of_recorders.grown(*topic)));
+            liveness.live(mission, false);
+            liveness.live_with(edges);
+            if liveness.lives.is_empty() {
+                liveness.live_with(std::mem::take(of_recorders.grown(*topic)));
             }
         }
     }
@@ -120,13 +122,13 @@ pub(crate) fn compute_lifetimes(
         let [_, Some(topic)] = what.ends() else {
             continue;
         };
-        let around = tracks.get(&ElementKey::Topic(topic));
+        let around = liveness_of.get(&ElementKey::Topic(topic));
         let around = around.map(|t| Rc::clone(&t.lives)).unwrap_or_default();
-        if let Some(track) = tracks.get_mut(&what) {
-            track.stay_within(&around);
+        if let Some(liveness) = liveness_of.get_mut(&what) {
+            liveness.stay_within(&around);
         }
     }
-    live_like(tracks, likes, true, |_, _| {});
+    live_like(liveness_of, likes, true, |_, _| {});
 }
 
 /// Adds the lifetimes of an edge to those of its topic's edges, very many of which may be equal.
@@ -140,22 +142,22 @@ fn add_lives(all: &mut Vec<Lifetime>, lives: &[Lifetime]) {
 
 /// Gives elements the lifetimes of others, either topics or not; those with signs of their own, the beginnings.
 fn live_like(
-    tracks: &mut Tracks,
+    liveness_of: &mut LivenessOf,
     likes: &[(ElementKey, ElementKey)],
     topics: bool,
     mut given: impl FnMut(ElementKey, &[Lifetime]),
 ) {
     for (what, other) in likes {
         if matches!(other, ElementKey::Topic(_)) == topics
-            && let Some(lives) = tracks.get(other).map(|t| Rc::clone(&t.lives))
-            && let Some(track) = tracks.get_mut(what)
+            && let Some(lives) = liveness_of.get(other).map(|t| Rc::clone(&t.lives))
+            && let Some(liveness) = liveness_of.get_mut(what)
         {
-            if track.signs.is_empty() {
-                track.lives = lives;
-            } else if !track.begin_with(&lives) {
+            if liveness.signs.is_empty() {
+                liveness.lives = lives;
+            } else if !liveness.begin_with(&lives) {
                 continue;
             }
-            given(*what, &track.lives);
+            given(*what, &liveness.lives);
         }
     }
 }

@@ -188,15 +188,15 @@ fn follows(silence: &Event, pause: &Event) -> bool {
     pause.what != silence.what && pause.time <= silence.time.plus(CROWD_NS) && silence.time <= until
 }
 
-/// Whether two rate changes are about equal, and less than `apart` nanoseconds apart.
-fn is_same_step(one: &Event, other: &Event, apart: i64) -> bool {
+/// Whether two rate changes are about equal, and at most `within` nanoseconds from each other.
+fn is_same_step(one: &Event, other: &Event, within: i64) -> bool {
     let ratio = |event: &Event| match event.detail {
         Detail::Rates { from_hz, to_hz } => to_hz / from_hz,
         _ => f64::NAN,
     };
     let between = ratio(one) / ratio(other);
     let is_near =
-        one.earliest <= other.latest.plus(apart) && other.earliest <= one.latest.plus(apart);
+        one.earliest <= other.latest.plus(within) && other.earliest <= one.latest.plus(within);
     one.what != other.what && is_near && (1.0 / SAME_STEP..=SAME_STEP).contains(&between)
 }
 
@@ -264,8 +264,8 @@ fn is_alike(first: &Event, other: &Event) -> bool {
         }
 }
 
-fn is_within(a: Stamp, b: Stamp, apart: i64) -> bool {
-    a.since(b).abs() <= apart
+fn is_within(a: Stamp, b: Stamp, within: i64) -> bool {
+    a.since(b).abs() <= within
 }
 
 #[cfg(test)]

@@ -24,7 +24,7 @@ pub(crate) fn explain(
     let spans = graphs.spans();
     let mut differ = vec![Differing::default(); spans.len()];
     for what in elements.all() {
-        for (at, exists) in graphs.turns(what) {
+        for (at, exists) in graphs.presence_changes(what) {
             let Differing { added, removed } = &mut differ[at];
             if exists { added } else { removed }.push(what);
         }

@@ -152,8 +152,8 @@ fn shares(context: &LogInput<'_>, drafts: &mut Drafts, topic: TopicId, senders: 
     cuts.sort_unstable();
     cuts.dedup();
     let mut before: Option<(NodeId, BTreeSet<NodeId>, Stamp)> = None;
-    let lasting = cuts.windows(2);
-    for pair in lasting.filter(|pair| pair[1].since(pair[0]) >= SHARE_HOLDS_NS) {
+    let between = cuts.windows(2);
+    for pair in between.filter(|pair| pair[1].since(pair[0]) >= SHARE_HOLDS_NS) {
         let inside = known
             .iter()
             .filter(|(_, s)| s.first <= pair[0] && pair[1] <= s.last);

@@ -26,7 +26,7 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
             }
             IncidentKind::Duplicate => (Kind::Duplicate, Detail::None),
             IncidentKind::Lost(many) => (Kind::Lost, Detail::Count(*many)),
-            IncidentKind::Turn(from, to) => {
+            IncidentKind::Switch(from, to) => {
                 let [from, to] = [from, to].map(|topic| publishers(context, *topic));
                 if from.is_empty() || to.is_empty() || from == to {
                     continue;
