@@ -29,6 +29,8 @@ pub(crate) mod values;
 pub use observation::{Confidence, EvidenceLine};
 pub use source::Source;
 
+use serde::{Deserialize, Serialize};
+
 use message::dynamic;
 use source::Read::{Log, Parameters, Payload};
 use source::{
@@ -38,8 +40,25 @@ use source::{
 };
 
 /// A set of kinds of evidence: bits at the indices of rows in [`SOURCES`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(
+    Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize,
+)]
+#[serde(from = "Vec<String>", into = "Vec<&'static str>")]
 pub struct Evidence(u64);
+
+/// In JSON: the words; unknown ones are ignored.
+impl From<Vec<String>> for Evidence {
+    fn from(words: Vec<String>) -> Self {
+        let all = words.iter().map(|word| Self::of(word));
+        all.fold(Self::NONE, Self::and)
+    }
+}
+
+impl From<Evidence> for Vec<&'static str> {
+    fn from(evidence: Evidence) -> Self {
+        evidence.words().collect()
+    }
+}
 
 impl Evidence {
     /// No evidence.
@@ -126,254 +145,90 @@ pub(crate) fn source_word(row: observation::SourceId) -> &'static str {
     SOURCES.get(row).map_or("", |s| s.word)
 }
 
+/// Rows of [`SOURCES`]: a word, a description, and what differs from [`NOTHING`].
+macro_rules! sources {
+    ($($word:literal $about:literal { $($field:ident: $value:expr),* })*) => {
+        &[$(Source { word: $word, about: $about, $($field: $value,)* ..NOTHING }),*]
+    };
+}
+
 /// All kinds of evidence; a set of them ([`Evidence`]) has at most 64 members.
-pub const SOURCES: &[Source] = &[
-    Source {
-        word: "connection",
-        about: "ROS 1 connection headers and MCAP channel metadata (`callerid`)",
-        conclude: &[connection::conclude],
-        ..NOTHING
-    },
-    Source {
-        word: "statistics",
-        about: "`/statistics` of ROS 1 (`rosgraph_msgs/TopicStatistics`)",
-        reads: &[(&[statistics::SHAPE], Payload(statistics::read))],
-        ..NOTHING
-    },
-    Source {
-        word: "topic_statistics",
-        about: "`/topic_statistics` of graph-monitor (`rosgraph_monitor_msgs/msg/TopicStatistics`)",
-        reads: &[(&[statistics::MONITOR], Payload(statistics::read_monitor))],
-        ..NOTHING
-    },
-    Source {
-        word: "rosgraph",
-        about: "`/rosgraph` of graph-monitor (`rosgraph_msgs/msg/Graph`, `rosgraph_monitor_msgs/msg/Graph`), and single nodes of nodl (`rosgraph_msgs/msg/Node`)",
-        reads: &[
-            (
-                &[rosgraph::SHAPE, rosgraph::OLD_SHAPE],
-                Payload(rosgraph::read),
-            ),
-            (&[rosgraph::NODE_SHAPE], Payload(rosgraph::read_node)),
-        ],
-        holds: true,
-        conclude: &[rosgraph::conclude],
-        ..NOTHING
-    },
-    Source {
-        word: "discovery",
-        about: "`ros_discovery_info` (`rmw_dds_common/msg/ParticipantEntitiesInfo`)",
-        reads: &[(&[discovery::SHAPE], Payload(discovery::read))],
-        ..NOTHING
-    },
-    Source {
-        word: "lifecycle",
-        about: "`<node>/transition_event` (`lifecycle_msgs/msg/TransitionEvent`)",
-        reads: &[(&[lifecycle::SHAPE], Payload(lifecycle::read))],
-        own: true,
-        ..NOTHING
-    },
-    Source {
-        word: "service_event",
-        about: "`<service>/_service_event` of service introspection",
-        reads: &[(&[service_event::SHAPE], Payload(service_event::read))],
-        ..NOTHING
-    },
-    Source {
-        word: "qos",
-        about: "offered quality of service in ROS 2 recordings",
-        announced: Some(qos::announced),
-        conclude: &[qos::conclude],
-        ..NOTHING
-    },
-    Source {
-        word: "parameter_events",
-        about: "`rcl_interfaces/msg/ParameterEvent`",
-        reads: &[(&[parameters::SHAPE], Parameters(parameters::read_node))],
-        ..NOTHING
-    },
-    Source {
-        word: "qos_overrides",
-        about: "`qos_overrides.<topic>` in parameter events, which rclcpp declares with each end",
-        reads: &[(&[parameters::SHAPE], Parameters(parameters::read_overrides))],
-        ..NOTHING
-    },
-    Source {
-        word: "sim_time",
-        about: "`use_sim_time` in parameter events: such a node subscribes to `/clock`",
-        reads: &[(&[parameters::SHAPE], Parameters(parameters::read_sim_time))],
-        own: true,
-        ..NOTHING
-    },
-    Source {
-        word: "links",
-        about: "log records of roscpp about its connections",
-        reads: &[(dynamic::ROS1_LOGS, Log(log_text::read_links))],
-        ..NOTHING
-    },
-    Source {
-        word: "diagnostics",
-        about: "statuses are named after their nodes; the publisher of `/diagnostics_agg` subscribes to `/diagnostics`",
-        reads: &[(&[diagnostics::SHAPE], Payload(diagnostics::read))],
-        conclude: &[diagnostics::conclude],
-        ..NOTHING
-    },
-    Source {
-        word: "rosout",
-        about: "log records of ROS 1 (`rosgraph_msgs/Log`) and ROS 2 (`rcl_interfaces/msg/Log`)",
-        reads: &[
-            (dynamic::ROS1_LOGS, Log(rosout::read)),
-            (&[dynamic::LOG2], Log(rosout::read_ros2)),
-        ],
-        conclude: &[rosout::conclude, rosout::conclude_ros2],
-        own: true,
-        ..NOTHING
-    },
-    Source {
-        word: "log_text",
-        about: "log messages in which a node names one of its topics",
-        reads: &[(dynamic::LOGS, Log(log_text::read))],
-        conclude: &[log_text::conclude],
-        ..NOTHING
-    },
-    Source {
-        word: "duplicate",
-        about: "log texts about two nodes of one name",
-        reads: &[(dynamic::LOGS, Log(log_text::read_duplicates))],
-        conclude: &[log_text::conclude_duplicates],
-        ..NOTHING
-    },
-    Source {
-        word: "messages_lost",
-        about: "`/events/rosbag2_messages_lost`: messages that the recorder lost (`rosbag2_interfaces/msg/MessagesLostEvent`)",
-        reads: &[(&[recorder::LOST], Payload(recorder::read_lost))],
-        conclude: &[recorder::conclude_lost],
-        ..NOTHING
-    },
-    Source {
-        word: "metrics",
-        about: "`/statistics` of ROS 2 (`statistics_msgs/msg/MetricsMessage`)",
-        reads: &[(&[statistics::METRICS], Payload(statistics::read_metrics))],
-        conclude: &[statistics::conclude_metrics],
-        own: true,
-        ..NOTHING
-    },
-    Source {
-        word: "dynamic_reconfigure",
-        about: "`<node>/parameter_descriptions` and `<node>/parameter_updates` of ROS 1 belong to one node",
-        conclude: &[conventions::dynamic_reconfigure],
-        ..NOTHING
-    },
-    Source {
-        word: "private_name",
-        about: "a topic in a node's private namespace with no other publisher",
-        conclude: &[conventions::private_name],
-        ..NOTHING
-    },
-    Source {
-        word: "action",
-        about: "an action's server publishes status, feedback and result and subscribes to goal and cancel; its client does the reverse",
-        reads: &[(&[action::SHAPE], Payload(action::read))],
-        conclude: &[action::conclude],
-        ..NOTHING
-    },
-    Source {
-        word: "bond",
-        about: "both ends of a bond (`bond/Status`) publish and subscribe to its topic",
-        conclude: &[conventions::bond],
-        ..NOTHING
-    },
-    Source {
-        word: "echo",
-        about: "log messages that quote a recorded message",
-        reads: &[(dynamic::LOGS, Log(echo::read))],
-        conclude: &[echo::conclude],
-        ..NOTHING
-    },
-    Source {
-        word: "contract",
-        about: "well-known nodes, by name and source file: their topics of the right type",
-        reads: &[(dynamic::LOGS, Log(contract::read))],
-        conclude: &[contract::conclude],
-        ..NOTHING
-    },
-    Source {
-        word: "only_publisher",
-        about: "messages without a publisher, of topics with one known publisher",
-        conclude: &[conventions::only_publisher],
-        ..NOTHING
-    },
-    Source {
-        word: "payload",
-        about: "messages forwarded byte by byte from input to output",
-        conclude: &[payload::conclude, payload::conclude_selected],
-        ..NOTHING
-    },
-    Source {
-        word: "equal_stamps",
-        about: "header stamps copied from input to output (with `--infer stamps`)",
-        conclude: &[equal_stamps::conclude],
-        ..NOTHING
-    },
-    Source {
-        word: "tf_pair",
-        about: "a subscriber of `/tf` also subscribes to `/tf_static`, and vice versa",
-        conclude: &[conventions::tf_pair],
-        ..NOTHING
-    },
-    Source {
-        word: "sister",
-        about: "a node whose twin in another namespace publishes the same and subscribes to more",
-        conclude: &[sister::conclude],
-        ..NOTHING
-    },
-    Source {
-        word: "anonymous",
-        about: "the start inside an anonymous name (`_PID_MILLISECONDS`, `_NANOSECONDS`)",
-        conclude: &[conventions::anonymous],
-        ..NOTHING
-    },
-    Source {
-        word: "recorder",
-        about: "the recorder subscribes to everything it records; its log records name its source file",
-        reads: &[(dynamic::LOGS, Log(recorder::read))],
-        conclude: &[recorder::conclude],
-        ..NOTHING
-    },
-    Source {
-        word: "rosout_rule",
-        about: "every node of ROS 1 publishes `/rosout`; the node `/rosout` forwards it to `/rosout_agg`",
-        conclude: &[rosout::conclude_rule],
-        ..NOTHING
-    },
-    Source {
-        word: "topology",
-        about: "your file of nodes and edges (CSV, YAML, DOT)",
-        ..NOTHING
-    },
-    Source {
-        word: "launch",
-        about: "your launch file, which declares nodes; Python is parsed and never executed",
-        ..NOTHING
-    },
-    Source {
-        word: "source",
-        about: "your source code: what it declares for nodes in the bag (with `--source`)",
-        ..NOTHING
-    },
-    Source {
-        word: "source_only",
-        about: "your source code: the only matching place for a node (with `--infer source`)",
-        ..NOTHING
-    },
-    Source {
-        word: "unknown",
-        about: "publishers that a ROS 2 recording counts but does not name",
-        ..NOTHING
-    },
-    Source {
-        word: "owned_type",
-        about: "an unnamed publisher of a type that only one well-known program publishes",
-        ..NOTHING
-    },
-];
+pub const SOURCES: &[Source] = sources! {
+    "connection" "ROS 1 connection headers and MCAP channel metadata (`callerid`)"
+        { conclude: &[connection::conclude] }
+    "statistics" "`/statistics` of ROS 1 (`rosgraph_msgs/TopicStatistics`)"
+        { reads: &[(&[statistics::SHAPE], Payload(statistics::read))] }
+    "topic_statistics" "`/topic_statistics` of graph-monitor (`rosgraph_monitor_msgs/msg/TopicStatistics`)"
+        { reads: &[(&[statistics::MONITOR], Payload(statistics::read_monitor))] }
+    "rosgraph" "`/rosgraph` of graph-monitor (`rosgraph_msgs/msg/Graph`, `rosgraph_monitor_msgs/msg/Graph`), and single nodes of nodl (`rosgraph_msgs/msg/Node`)"
+        { reads: &[(&[rosgraph::SHAPE, rosgraph::OLD_SHAPE], Payload(rosgraph::read)),
+                   (&[rosgraph::NODE_SHAPE], Payload(rosgraph::read_node))],
+          holds: true,
+          conclude: &[rosgraph::conclude] }
+    "discovery" "`ros_discovery_info` (`rmw_dds_common/msg/ParticipantEntitiesInfo`)"
+        { reads: &[(&[discovery::SHAPE], Payload(discovery::read))] }
+    "lifecycle" "`<node>/transition_event` (`lifecycle_msgs/msg/TransitionEvent`)"
+        { reads: &[(&[lifecycle::SHAPE], Payload(lifecycle::read))], own: true }
+    "service_event" "`<service>/_service_event` of service introspection"
+        { reads: &[(&[service_event::SHAPE], Payload(service_event::read))] }
+    "qos" "offered quality of service in ROS 2 recordings"
+        { announced: Some(qos::announced), conclude: &[qos::conclude] }
+    "parameter_events" "`rcl_interfaces/msg/ParameterEvent`"
+        { reads: &[(&[parameters::SHAPE], Parameters(parameters::read_node))] }
+    "qos_overrides" "`qos_overrides.<topic>` in parameter events, which rclcpp declares with each end"
+        { reads: &[(&[parameters::SHAPE], Parameters(parameters::read_overrides))] }
+    "sim_time" "`use_sim_time` in parameter events: such a node subscribes to `/clock`"
+        { reads: &[(&[parameters::SHAPE], Parameters(parameters::read_sim_time))], own: true }
+    "links" "log records of roscpp about its connections"
+        { reads: &[(dynamic::ROS1_LOGS, Log(log_text::read_links))] }
+    "diagnostics" "statuses are named after their nodes; the publisher of `/diagnostics_agg` subscribes to `/diagnostics`"
+        { reads: &[(&[diagnostics::SHAPE], Payload(diagnostics::read))], conclude: &[diagnostics::conclude] }
+    "rosout" "log records of ROS 1 (`rosgraph_msgs/Log`) and ROS 2 (`rcl_interfaces/msg/Log`)"
+        { reads: &[(dynamic::ROS1_LOGS, Log(rosout::read)), (&[dynamic::LOG2], Log(rosout::read_ros2))],
+          conclude: &[rosout::conclude, rosout::conclude_ros2],
+          own: true }
+    "log_text" "log messages in which a node names one of its topics"
+        { reads: &[(dynamic::LOGS, Log(log_text::read))], conclude: &[log_text::conclude] }
+    "duplicate" "log texts about two nodes of one name"
+        { reads: &[(dynamic::LOGS, Log(log_text::read_duplicates))], conclude: &[log_text::conclude_duplicates] }
+    "messages_lost" "`/events/rosbag2_messages_lost`: messages that the recorder lost (`rosbag2_interfaces/msg/MessagesLostEvent`)"
+        { reads: &[(&[recorder::LOST], Payload(recorder::read_lost))], conclude: &[recorder::conclude_lost] }
+    "metrics" "`/statistics` of ROS 2 (`statistics_msgs/msg/MetricsMessage`)"
+        { reads: &[(&[statistics::METRICS], Payload(statistics::read_metrics))],
+          conclude: &[statistics::conclude_metrics],
+          own: true }
+    "dynamic_reconfigure" "`<node>/parameter_descriptions` and `<node>/parameter_updates` of ROS 1 belong to one node"
+        { conclude: &[conventions::dynamic_reconfigure] }
+    "private_name" "a topic in a node's private namespace with no other publisher"
+        { conclude: &[conventions::private_name] }
+    "action" "an action's server publishes status, feedback and result and subscribes to goal and cancel; its client does the reverse"
+        { reads: &[(&[action::SHAPE], Payload(action::read))], conclude: &[action::conclude] }
+    "bond" "both ends of a bond (`bond/Status`) publish and subscribe to its topic"
+        { conclude: &[conventions::bond] }
+    "echo" "log messages that quote a recorded message"
+        { reads: &[(dynamic::LOGS, Log(echo::read))], conclude: &[echo::conclude] }
+    "contract" "well-known nodes, by name and source file: their topics of the right type"
+        { reads: &[(dynamic::LOGS, Log(contract::read))], conclude: &[contract::conclude] }
+    "only_publisher" "messages without a publisher, of topics with one known publisher"
+        { conclude: &[conventions::only_publisher] }
+    "payload" "messages forwarded byte by byte from input to output"
+        { conclude: &[payload::conclude, payload::conclude_selected] }
+    "equal_stamps" "header stamps copied from input to output (with `--infer stamps`)"
+        { conclude: &[equal_stamps::conclude] }
+    "tf_pair" "a subscriber of `/tf` also subscribes to `/tf_static`, and vice versa"
+        { conclude: &[conventions::tf_pair] }
+    "sister" "a node whose twin in another namespace publishes the same and subscribes to more"
+        { conclude: &[sister::conclude] }
+    "anonymous" "the start inside an anonymous name (`_PID_MILLISECONDS`, `_NANOSECONDS`)"
+        { conclude: &[conventions::anonymous] }
+    "recorder" "the recorder subscribes to everything it records; its log records name its source file"
+        { reads: &[(dynamic::LOGS, Log(recorder::read))], conclude: &[recorder::conclude] }
+    "rosout_rule" "every node of ROS 1 publishes `/rosout`; the node `/rosout` forwards it to `/rosout_agg`"
+        { conclude: &[rosout::conclude_rule] }
+    "topology" "your file of nodes and edges (CSV, YAML, DOT)" {}
+    "launch" "your launch file, which declares nodes; Python is parsed and never executed" {}
+    "source" "your source code: what it declares for nodes in the bag (with `--source`)" {}
+    "source_only" "your source code: the only matching place for a node (with `--infer source`)" {}
+    "unknown" "publishers that a ROS 2 recording counts but does not name" {}
+    "owned_type" "an unnamed publisher of a type that only one well-known program publishes" {}
+};

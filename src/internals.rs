@@ -25,7 +25,7 @@ pub mod graph {
 /// See `src/mission.rs`.
 pub mod mission {
     pub use crate::mission::{
-        EventLog, Mission, Window, event_log, events, info, phases, read_json, write_json,
+        EventLog, Mission, Window, event_log, info, phases, read_json, write_json,
     };
 }
 

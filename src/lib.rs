@@ -172,7 +172,7 @@ pub mod commands {
     //! The jobs of the other commands: the summary, the log, the table of messages, the survey of a folder, the counts of
     //! many bags, the check against an expectations file and the writing of one, the comparison of two missions.
 
-    pub use crate::mission::events::{LogFormat, LogOptions, log};
+    pub use crate::mission::event_log::{LogFormat, LogOptions, log};
     pub use crate::mission::info::{Info, info};
     #[cfg(feature = "render")]
     pub use crate::pipeline::{

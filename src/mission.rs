@@ -1,15 +1,17 @@
-//! The mission: all windows with their graphs and changes; written as JSON, which can be read as an input.
+//! The mission: all windows with their graphs and changes.
+//!
+//! In: the elements, the history and the graph of each window. Out: a [`Mission`], with its log of events, its phases and its
+//! summary, as JSON and back. Begin with `event_log`, what happened and when; `phases` divides the mission by it, `info` sums it
+//! up, `json` writes and reads it.
 
 pub mod event_log;
-pub mod events;
 pub mod info;
 pub mod phases;
 
 mod joined;
 mod json;
-pub use json::read::read_json;
-pub(crate) use json::write::Json;
-pub use json::write::write_json;
+pub(crate) use json::Json;
+pub use json::{read_json, write_json};
 
 use serde::{Deserialize, Serialize};
 
@@ -157,7 +159,7 @@ impl Mission {
             seen.lives = lives;
         }
         self.sending = Sending::of_windows(&self.elements, &self.graphs);
-        self.log = EventLog::from_changes(&self.elements, &self.windows);
+        self.log = event_log::from_changes(&self.elements, &self.windows);
         let places = event_log::places(&self.log, &self.windows);
         for (window, places) in self.windows.iter_mut().zip(places) {
             window.events = places;

@@ -4,7 +4,7 @@
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
-use bagreel::internals::mission::events::{LogFormat, LogOptions, log};
+use bagreel::internals::mission::event_log::{LogFormat, LogOptions, log};
 use bagreel::internals::mission::info::info;
 use bagreel::{Mission, Reading, read};
 

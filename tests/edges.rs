@@ -9,7 +9,7 @@ use bagreel::internals::evidence::conclude;
 use bagreel::internals::evidence::topology::{NamedElement, Topology, TopologyEntry};
 use bagreel::internals::evidence::{Confidence, EvidenceLine};
 use bagreel::internals::graph::{self, Built};
-use bagreel::internals::mission::events::{LogFormat, LogOptions, log};
+use bagreel::internals::mission::event_log::{LogFormat, LogOptions, log};
 use bagreel::values::{EdgeId, TopicId};
 
 use crate::support::cdr::Cdr;

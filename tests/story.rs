@@ -7,7 +7,7 @@ use bagreel::internals::base::time::Period;
 use bagreel::internals::graph::diff::{apply, diff};
 use bagreel::internals::graph::window::Length;
 use bagreel::internals::mission::event_log::Kind;
-use bagreel::internals::mission::events::{LogFormat, LogOptions, log};
+use bagreel::internals::mission::event_log::{LogFormat, LogOptions, log};
 use bagreel::internals::mission::{Mission, read_json, write_json};
 use bagreel::{Reading, read};
 

@@ -1,5 +1,6 @@
 //! Ids as types, and lists with a value per id.
 
+use std::collections::BTreeMap;
 use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut, Index, IndexMut};
 
@@ -146,6 +147,52 @@ impl<I: Id, T> ById<I, Vec<T>> {
     /// The list of an id; empty beyond the end.
     pub(crate) fn of(&self, id: I) -> &[T] {
         self.get(id).map_or(&[], |list| list)
+    }
+}
+
+/// As [`ById`], for values that few of very many ids have: the others take no space.
+#[derive(Clone, Debug)]
+pub(crate) struct Few<I, T>(BTreeMap<I, T>);
+
+impl<I: Copy + Ord, T> Few<I, T> {
+    pub(crate) fn get(&self, id: I) -> Option<&T> {
+        self.0.get(&id)
+    }
+
+    /// The value of an id, to change it.
+    pub(crate) fn grown(&mut self, id: I) -> &mut T
+    where
+        T: Default,
+    {
+        self.0.entry(id).or_default()
+    }
+
+    /// Every value with its id, in their order.
+    pub(crate) fn with_ids(&self) -> impl Iterator<Item = (I, &T)> + Clone {
+        self.0.iter().map(|(id, value)| (*id, value))
+    }
+
+    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = &mut T> {
+        self.0.values_mut()
+    }
+}
+
+impl<I: Copy + Ord, T> Few<I, Vec<T>> {
+    /// The list of an id; empty if it has none.
+    pub(crate) fn of(&self, id: I) -> &[T] {
+        self.get(id).map_or(&[], |list| list)
+    }
+}
+
+impl<I, T> Default for Few<I, T> {
+    fn default() -> Self {
+        Self(BTreeMap::new())
+    }
+}
+
+impl<I: Ord, T> FromIterator<(I, T)> for Few<I, T> {
+    fn from_iter<L: IntoIterator<Item = (I, T)>>(list: L) -> Self {
+        Self(list.into_iter().collect())
     }
 }
 

@@ -4,13 +4,16 @@ use std::fmt;
 use std::num::NonZeroI64;
 
 use chrono::DateTime;
+use serde::{Deserialize, Serialize};
 
 use super::{cast, words};
 
 /// A point in time: nanoseconds since 1970-01-01T00:00:00Z, by the clock of the recorder.
 ///
 /// Bags contain any value: 0, simulated time near 0, negative numbers. All of `i64` is allowed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(
+    Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize,
+)]
 pub struct Stamp(pub i64);
 
 const SECOND: i64 = 1_000_000_000;
@@ -61,12 +64,26 @@ impl fmt::Display for Stamp {
 }
 
 /// A half-open interval `[start, end)`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, Serialize)]
+#[serde(from = "[Stamp; 2]", into = "[Stamp; 2]")]
 pub struct Span {
     /// The start, inclusive.
     pub start: Stamp,
     /// The end, exclusive; never before `start`.
     pub end: Stamp,
+}
+
+/// In JSON: the start and the end; an end before the start is the start.
+impl From<[Stamp; 2]> for Span {
+    fn from([start, end]: [Stamp; 2]) -> Self {
+        Self::new(start, end.max(start))
+    }
+}
+
+impl From<Span> for [Stamp; 2] {
+    fn from(span: Span) -> Self {
+        [span.start, span.end]
+    }
 }
 
 impl Span {

@@ -18,7 +18,7 @@ use crate::base::words::worded;
 use crate::export::tables::TableFormat;
 use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::{Align, Cut, Division, Length};
-use crate::mission::events::LogFormat;
+use crate::mission::event_log::LogFormat;
 use values::{length, moment, namespace, offset, one_of, period, share};
 
 /// The version, and in packages the commit that they were built from: `0.1.0 (1a2b3c4d5e 2026-11-23)`.

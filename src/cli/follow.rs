@@ -11,7 +11,7 @@ use crate::base::time::Period;
 use crate::export::Output;
 use crate::gate::{Expectation, FORMATS, judge};
 use crate::graph::window::Length;
-use crate::mission::events::LogFormat;
+use crate::mission::event_log::LogFormat;
 use crate::pipeline::follow::{Feed, FindingFeed, Follow};
 use crate::pipeline::{Reading, Render};
 

@@ -10,7 +10,7 @@ use super::{DONE, SKIPPED, code};
 use crate::base::error::Error;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::graph::window::Length;
-use crate::mission::events::{LogFormat, LogLine, LogOptions, body, lines, log, whole};
+use crate::mission::event_log::{LogFormat, LogLine, LogOptions, body, lines, log, whole};
 use crate::mission::info::{SurveyRow, json, survey_text};
 use crate::pipeline::{Reading, Survey, each, explain, is_survey, read, survey, survey_file};
 

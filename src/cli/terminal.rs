@@ -16,7 +16,7 @@ use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words::{self, visible};
 use crate::mission::event_log::Kind;
-use crate::mission::events::{LogFormat, LogLine};
+use crate::mission::event_log::{LogFormat, LogLine};
 use crate::pipeline::{Stage, Watch};
 use progress::Progress;
 

@@ -15,7 +15,8 @@ use crate::evidence::times::Calendar;
 pub(crate) const DAY: i64 = 86_400_000_000_000;
 /// The distance in days beyond which times count as far from all others: no mission has a pause of a year.
 pub(crate) const FAR_DAYS: i64 = 365;
-/// The most far messages that are set aside, as one in so many messages: more are no accident, but a clock that jumped.
+/// The most far messages that are set aside, as one in so many messages: more are no accident, but a clock that jumped. Accidents
+/// are single messages before a clock was set; with a half, the shorter part of a mission across a jump would be lost.
 const RARE: u64 = 10;
 /// The days after 1970, ten years, that count as an unset clock: without a battery it begins there, and no robot
 /// recorded then.
@@ -157,14 +158,15 @@ fn stated(clusters: &[DayCluster]) -> String {
 
 // Differences between the clocks of several recorders, by the messages that two of them recorded.
 
-/// The fewest common messages that are significant: a few short ones may be equal by chance.
+/// The fewest common messages that are significant: a few short ones may be equal by chance, and ten take a second at 10 Hz.
 const FEWEST: usize = 10;
 /// The fewest topics that must agree: a node may send the same sequence again.
 const TOPICS: usize = 2;
-/// The share, in per cent, of the messages in common that must agree about the offset; the others were delayed on their way.
+/// The share, in per cent, of the messages in common that must agree about the offset; the others were delayed on their way. With a
+/// half, two recordings of one robot whose messages repeat would have an offset.
 const SHARE: usize = 80;
 /// The largest difference between the offsets of two messages, in nanoseconds: they take different paths to
-/// the recorders.
+/// the recorders, over a network within some ten milliseconds. Smaller offsets than this do not change a window.
 const NEAR_NS: i64 = 50_000_000;
 
 /// The offset of a recorder's clock.
@@ -209,8 +211,9 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
     let mut found = Vec::new();
     for (at, bag) in filled.iter().copied().enumerate() {
         let mut before = filled[..at].iter().copied();
-        let apart = before.find_map(|other| Some((other, apart(&bags[other], &bags[bag])?)));
-        if let Some((other, (ahead, messages))) = apart
+        let found_offset =
+            before.find_map(|other| Some((other, offset(&bags[other], &bags[bag])?)));
+        if let Some((other, (ahead, messages))) = found_offset
             && ahead.abs() > NEAR_NS
         {
             found.push(ClockOffset {
@@ -225,7 +228,7 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
 }
 
 /// The delay of the common messages in the second recording, and their number; `None` without agreement.
-fn apart(one: &Contents<'_>, other: &Contents<'_>) -> Option<(i64, usize)> {
+fn offset(one: &Contents<'_>, other: &Contents<'_>) -> Option<(i64, usize)> {
     let both = other.iter().filter_map(|(key, time)| {
         let before = one.get(key)?.as_ref()?;
         Some((time.as_ref()?.since(*before), key.0))
@@ -360,16 +363,16 @@ mod tests {
         fn an_offset_needs_messages_that_agree() {
             let one: Vec<i64> = (0..20).map(|n| n * 100).collect();
             let later: Vec<i64> = one.iter().map(|t| t + 350 + t % 7).collect();
-            let (ahead, messages) = apart(&contents(&one), &contents(&later)).unwrap();
+            let (ahead, messages) = offset(&contents(&one), &contents(&later)).unwrap();
             assert_eq!((ahead / 10_000_000, messages), (35, 20));
             let wild: Vec<i64> = one.iter().map(|t| t * 2).collect();
-            assert_eq!(apart(&contents(&one), &contents(&wild)), None);
-            assert_eq!(apart(&contents(&one[..5]), &contents(&later)), None);
+            assert_eq!(offset(&contents(&one), &contents(&wild)), None);
+            assert_eq!(offset(&contents(&one[..5]), &contents(&later)), None);
             let only = |mut all: Contents<'static>| {
                 all.retain(|key, _| key.0 == "/tf");
                 all
             };
-            assert_eq!(apart(&only(contents(&one)), &only(contents(&later))), None);
+            assert_eq!(offset(&only(contents(&one)), &only(contents(&later))), None);
         }
     }
 }

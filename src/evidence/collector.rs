@@ -80,7 +80,7 @@ impl Default for CollectOptions {
 /// compared unless requested: most of them are read by their index, an advantage that would be lost if every
 /// payload were read.
 pub const PAYLOAD_BYTES: u64 = 64 << 20;
-/// The cost of a payload besides its bytes, in bytes: its hash is kept.
+/// The cost of a payload besides its bytes, in bytes: its hash is kept, in a table and with its time.
 const PAYLOAD_ENTRY: u64 = 64;
 
 /// How the messages of a stream are read.

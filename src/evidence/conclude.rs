@@ -109,7 +109,7 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
     }
     for incident in &mut incidents {
         incident.what = incident.what.renamed(&to);
-        if let IncidentKind::Turn(from, before) = &mut incident.kind {
+        if let IncidentKind::Switch(from, before) = &mut incident.kind {
             (*from, *before) = (to(*from), to(*before));
         }
     }

@@ -5,7 +5,7 @@ use std::io;
 use std::sync::Arc;
 
 use crate::bag::{Connection, Encoding};
-use crate::base::ids::ById;
+use crate::base::ids::{ById, Few};
 use crate::base::name::{is_log, plain_type};
 use crate::base::rhythm::CLOSE_NS;
 use crate::base::time::{Span, Stamp};
@@ -61,7 +61,25 @@ pub(crate) enum ElementKey {
     Subscribe(Name, Name),
 }
 
+/// What a node does with a topic, in words.
+pub(crate) fn verb(publishes: bool) -> &'static str {
+    if publishes {
+        "publishes"
+    } else {
+        "subscribes to"
+    }
+}
+
 impl ElementKey {
+    /// A node publishes a topic, or subscribes to it.
+    pub(crate) fn edge(publishes: bool, node: Name, topic: Name) -> Self {
+        if publishes {
+            Self::Publish(node, topic)
+        } else {
+            Self::Subscribe(topic, node)
+        }
+    }
+
     /// The node and the topic: both for an edge, otherwise one.
     pub(crate) fn ends(self) -> [Option<Name>; 2] {
         match self {
@@ -630,19 +648,19 @@ fn absences(signs: &[Stamp], snapshots: &[Stamp]) -> Vec<Stamp> {
 pub(crate) struct Closed {
     /// By node: all topics that a rospy node names as its own, or all that a snapshot of the graph shows for
     /// a node.
-    all: ById<Name, BTreeSet<Name>>,
+    all: Few<Name, BTreeSet<Name>>,
     /// By node: all topics that a roscpp node publishes.
-    published: ById<Name, BTreeSet<Name>>,
+    published: Few<Name, BTreeSet<Name>>,
     /// Nodes whose lists were repeated long after the first: a list made at a node's start may lack later topics.
     settled: BTreeSet<Name>,
     /// Topics on which every message names its publisher, with all these publishers.
-    stated: ById<Name, BTreeSet<Name>>,
+    stated: Few<Name, BTreeSet<Name>>,
 }
 
 impl Closed {
     pub(crate) fn new(known: &Conclusions<'_>) -> Self {
         let mut closed = Self::default();
-        let mut times: ById<Name, Option<Span>> = ById::default();
+        let mut times: BTreeMap<Name, Span> = BTreeMap::new();
         for fact in &known.facts.list {
             let listed = fact.snapshot.is_some();
             let word = source_word(fact.source);
@@ -655,7 +673,7 @@ impl Closed {
                 known.facts.times.bounds(fact.times),
                 listed,
             ) {
-                let span = times.grown(node).get_or_insert(Span::new(first, last));
+                let span = times.entry(node).or_insert(Span::new(first, last));
                 span.start = span.start.min(first);
                 span.end = span.end.max(last);
             }
@@ -673,8 +691,8 @@ impl Closed {
                 _ => {}
             }
         }
-        let settled = times.somes().filter(|(_, span)| span.nanos() >= SETTLED_NS);
-        closed.settled = settled.map(|(node, _)| node).collect();
+        let settled = times.iter().filter(|(_, span)| span.nanos() >= SETTLED_NS);
+        closed.settled = settled.map(|(node, _)| *node).collect();
         closed.fill(known);
         closed
     }
@@ -726,11 +744,11 @@ impl Closed {
 }
 
 /// The time after a node's start at which it has made its connections, in nanoseconds; a list made
-/// earlier may lack some.
+/// earlier may lack some. Nodes that wait for a map or a transform take three seconds; with less, their later topics would be denied.
 const SETTLED_NS: i64 = 5_000_000_000;
 
 /// Whether there is a list for `of` without `member`.
-fn lacks(lists: &ById<Name, BTreeSet<Name>>, of: Name, member: Name) -> bool {
+fn lacks(lists: &Few<Name, BTreeSet<Name>>, of: Name, member: Name) -> bool {
     let list = lists.get(of).filter(|list| !list.is_empty());
     list.is_some_and(|list| !list.contains(&member))
 }
@@ -747,7 +765,7 @@ pub(crate) enum IncidentKind {
     /// The recorder lost so many messages.
     Lost(u64),
     /// A node that forwarded the messages of one topic now forwards those of another.
-    Turn(Name, Name),
+    Switch(Name, Name),
 }
 
 /// A statement about an element.

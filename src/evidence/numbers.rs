@@ -11,7 +11,8 @@ use crate::evidence::message::dynamic::MessageSchema;
 
 /// The number of bytes from a payload's start to the end of its header's stamp.
 pub(crate) const HEAD: usize = 12;
-/// The most possible restarts per stream at which numbers are kept: no node restarts more often.
+/// The most possible restarts per stream at which numbers are kept: no node restarts more often in a mission, and a stream of
+/// random numbers, which seem to start over all the time, takes no more than 100 kB.
 const MOST: usize = 4096;
 
 /// The number in a header, with the stamp beside it as in the message: only copies share both.

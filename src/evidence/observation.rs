@@ -114,6 +114,15 @@ observations! {
 }
 
 impl Observation {
+    /// A node publishes a topic, or subscribes to it.
+    pub(crate) fn edge(publishes: bool, node: Name, topic: Name) -> Self {
+        if publishes {
+            Self::Publish(node, topic)
+        } else {
+            Self::Subscribe(node, topic)
+        }
+    }
+
     /// The first two names in the observation.
     pub(crate) fn names(self) -> [Option<Name>; 2] {
         let (first, second) = (Cell::new(None), Cell::new(None));
@@ -504,9 +513,10 @@ pub(crate) struct LoggedTexts {
     bytes: [usize; 2],
 }
 
-/// The most bytes of log texts, and of values, that are kept.
+/// The most bytes of log texts, and of values, that are kept: some ten thousand texts, more than an hour of talkative nodes. They are
+/// compared with each other, which takes a tenth of a second for so many.
 const MOST_TEXTS: usize = 2 << 20;
-/// The overhead of a short text in bytes.
+/// The overhead of a short text in bytes: its time, its logger and its allocation.
 const TEXT_ENTRY: usize = 48;
 
 impl LoggedTexts {

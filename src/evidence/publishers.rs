@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
-use crate::base::ids::ById;
+use crate::base::ids::{ById, Few};
 use crate::base::name::{is_log, is_player};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::{BREAK_NS, FEWEST, RECENT, UNUSUAL, broken_after};
@@ -72,9 +72,9 @@ const PLAYBACK: &str =
 /// The topics that nodes name as their own in log records and similar messages.
 #[derive(Default)]
 struct NamedTopics {
-    topics: ById<Name, BTreeSet<Name>>,
+    topics: Few<Name, BTreeSet<Name>>,
     /// Names that log over the connection of another node.
-    guests: ById<Name, BTreeSet<Name>>,
+    guests: Few<Name, BTreeSet<Name>>,
 }
 
 impl NamedTopics {
@@ -230,9 +230,9 @@ struct RewrittenBag<'a> {
     facts: &'a Observations,
     messages: &'a Stamps,
     /// The observations about each node.
-    stated: ById<Name, Vec<SeriesId>>,
+    stated: Few<Name, Vec<SeriesId>>,
     /// The streams that each node published, as far as known.
-    own: ById<Name, Vec<usize>>,
+    own: Few<Name, Vec<usize>>,
     /// The last message.
     end: Stamp,
     /// The times without any message, computed on demand.
@@ -246,13 +246,13 @@ impl<'a> RewrittenBag<'a> {
         facts: &'a Observations,
         messages: &'a Stamps,
     ) -> Self {
-        let mut stated: ById<Name, Vec<SeriesId>> = ById::default();
+        let mut stated: Few<Name, Vec<SeriesId>> = Few::default();
         for fact in &facts.list {
             if let Some(node) = shown(fact.observation) {
                 stated.grown(node).push(fact.times);
             }
         }
-        let mut own: ById<Name, Vec<usize>> = ById::default();
+        let mut own: Few<Name, Vec<usize>> = Few::default();
         for at in of_bag {
             if let (Some(node), true) = (streams[*at].publisher, is_own(streams, *at)) {
                 own.grown(node).push(*at);

@@ -21,7 +21,7 @@ pub(crate) struct Parsed {
 /// hundredth of them. Parsing of maliciously slow text is abandoned, by counting work instead of time.
 const BREATHS_PER_BYTE: usize = 4;
 
-/// The deepest nesting of elements that is visited: real code stays below a hundred.
+/// The deepest nesting of elements that is visited: real code stays below a hundred, and readers keep a class per level.
 const DEEPEST: usize = 400;
 
 impl Parsed {
@@ -75,6 +75,18 @@ pub(crate) fn children(node: Node<'_>) -> Vec<Node<'_>> {
     let mut cursor = node.walk();
     let all = node.named_children(&mut cursor);
     all.filter(|child| !child.is_extra()).collect()
+}
+
+/// These fields of an element; `None` unless it has all of them.
+pub(crate) fn fields<'a, const N: usize>(
+    node: Node<'a>,
+    names: [&str; N],
+) -> Option<[Node<'a>; N]> {
+    let mut found = [node; N];
+    for (field, name) in found.iter_mut().zip(names) {
+        *field = node.child_by_field_name(name)?;
+    }
+    Some(found)
 }
 
 /// The arguments of a call.

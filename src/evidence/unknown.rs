@@ -7,7 +7,7 @@
 
 use crate::base::name::is_quiet;
 use crate::base::words::count;
-use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
+use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity, verb};
 use crate::evidence::observation::{Confidence, Name};
 use crate::evidence::source::contract::Owners;
 use crate::evidence::source_id;
@@ -72,16 +72,12 @@ fn owned(known: &mut Conclusions<'_>, owners: &Owners, topic: Name) {
     let edge = ElementKey::Publish(node, topic);
     add(known, "owned_type", node, edge, &|| why.clone());
     for (publishes, other) in owners.others(known, &kind, &owner) {
-        let (verb, edge) = if publishes {
-            ("publishes", ElementKey::Publish(node, other))
-        } else {
-            ("subscribes to", ElementKey::Subscribe(other, node))
-        };
+        let edge = ElementKey::edge(publishes, node, other);
         let is_free = !publishes || known.publishers(other).next().is_none();
         if is_free && !known.knows(edge) {
             let of = known.text(other);
             add(known, "owned_type", node, edge, &|| {
-                format!("{why}; it {verb} {of} as well")
+                format!("{why}; it {} {of} as well", verb(publishes))
             });
         }
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::io;
 use std::sync::Arc;
 
-use crate::base::ids::ById;
+use crate::base::ids::Few;
 use crate::base::name::SERVICE;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::observation::{Name, Observation, Observations};
@@ -36,9 +36,9 @@ fn arrange(states: &mut [(Stamp, Arc<str>)]) {
 #[derive(Debug, Default)]
 pub(crate) struct StatedValues {
     /// The states of each node with the times of its transitions, sorted.
-    states: ById<Name, Vec<(Stamp, Arc<str>)>>,
-    types: ById<Name, BTreeSet<Arc<str>>>,
-    qualities: ById<Name, BTreeSet<Arc<str>>>,
+    states: Few<Name, Vec<(Stamp, Arc<str>)>>,
+    types: Few<Name, BTreeSet<Arc<str>>>,
+    qualities: Few<Name, BTreeSet<Arc<str>>>,
 }
 
 impl StatedValues {

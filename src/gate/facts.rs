@@ -425,7 +425,7 @@ impl<'a> Facts<'a> {
         let graphs = &self.mission.graphs;
         let last = |node: &NodeId| {
             let rows = graphs.rows(Element::Node(*node));
-            let named = rows.filter_map(|(at, row)| Some((at, *node, graphs.lifecycle(&row)?)));
+            let named = rows.filter_map(|(at, row)| Some((at, *node, &**graphs.lifecycle(&row)?)));
             named.last()
         };
         let last = nodes.iter().filter_map(last).max();

@@ -14,7 +14,7 @@ use crate::base::time::Span;
 use crate::base::words::{self, visible, worded};
 use crate::mission::Mission;
 use crate::mission::event_log::Kind;
-use crate::mission::events::sentence;
+use crate::mission::event_log::sentence;
 
 /// One checked fact of an expectations file.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use crate::base::ids::ids;
 use crate::base::name::{NodeName, TopicName, is_player, is_quiet, is_recorder, is_service};
 use crate::base::time::{Span, Stamp};
@@ -18,15 +20,20 @@ ids! {
 }
 
 /// How an element is known, and when it exists, over the whole mission.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[serde(default)]
 pub struct Existence {
     /// The kinds of evidence for it.
+    #[serde(skip)]
     pub evidence: Evidence,
     /// The time of its first message or other sign.
+    #[serde(rename = "first_ns")]
     pub first: Option<Stamp>,
     /// The time of its last message or other sign.
+    #[serde(rename = "last_ns")]
     pub last: Option<Stamp>,
     /// The intervals in which it exists, in order, half-open; empty if only windows are known.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lives: Vec<Span>,
 }
 

@@ -70,7 +70,7 @@ impl Graphs {
     }
 
     /// The indices of the windows from which an element exists (`true`) or no longer exists.
-    pub(crate) fn turns(&self, what: Element) -> Vec<(usize, bool)> {
+    pub(crate) fn presence_changes(&self, what: Element) -> Vec<(usize, bool)> {
         let mut found = Vec::new();
         let Some(mut cursor) = self.cursor(what) else {
             return found;
@@ -96,14 +96,8 @@ impl Graphs {
     }
 
     /// The lifecycle state in a row.
-    pub(crate) fn lifecycle(&self, row: &Row) -> Option<&str> {
+    pub(crate) fn lifecycle(&self, row: &Row) -> Option<&Arc<str>> {
         self.lifecycle_of(row.lifecycle)
-    }
-
-    /// The lifecycle state in a row, as a shared text.
-    pub(crate) fn lifecycle_word(&self, row: &Row) -> Option<Arc<str>> {
-        let place = (row.lifecycle as usize).checked_sub(1)?;
-        self.lifecycles.get(place).map(Arc::clone)
     }
 
     /// A walk through all windows that yields only differences from the previous one.
@@ -112,11 +106,8 @@ impl Graphs {
     }
 
     /// The lifecycle state of this number, counted from 1.
-    pub(crate) fn lifecycle_of(&self, place: u32) -> Option<&str> {
-        let place = (place as usize).checked_sub(1);
-        place
-            .and_then(|at| self.lifecycles.get(at))
-            .map(|word| &**word)
+    pub(crate) fn lifecycle_of(&self, place: u32) -> Option<&Arc<str>> {
+        self.lifecycles.get((place as usize).checked_sub(1)?)
     }
 }
 
@@ -145,7 +136,7 @@ impl Iterator for Iter<'_> {
             let rows = cursors.iter_mut().enumerate();
             states.extend(rows.filter_map(|(at, cursor)| {
                 let row = cursor.next()?;
-                Some(row.state(of(at), span, &self.all.lifecycles))
+                Some(row.state(of(at), span, self.all.lifecycle(&row)))
             }));
         }
         self.next += 1;
@@ -200,9 +191,9 @@ impl GraphsWriter {
         columns[id] = rows.finish();
     }
 
-    /// A cursor over the rows of an element that has been set.
-    pub(crate) fn cursor(&self, what: Element) -> Option<ColumnCursor<'_>> {
-        self.0.cursor(what)
+    /// A copy of the rows of an element that has been set.
+    pub(crate) fn column(&self, what: Element) -> Option<Column> {
+        self.0.columns.of(what).cloned()
     }
 
     /// The number of a lifecycle state in rows, counted from 1; states are few.
@@ -262,13 +253,9 @@ impl Number {
         };
         let halves = libm::round(value * 2e9);
         let exact = Self::Halves(cast::to_i64(halves));
-        let is_exact =
-            halves.abs() < EXACT && exact.value().map(f64::to_bits) == Some(value.to_bits());
-        if is_exact {
-            exact
-        } else {
-            Self::Bits(value.to_bits())
-        }
+        let bits = value.to_bits();
+        let is_exact = halves.abs() < EXACT && exact.value().map(f64::to_bits) == Some(bits);
+        if is_exact { exact } else { Self::Bits(bits) }
     }
 
     pub(crate) fn value(self) -> Option<f64> {
@@ -280,7 +267,7 @@ impl Number {
     }
 }
 
-/// The number below which integers are exact in a float.
+/// The number below which integers are exact in a float, 2^53, rounded down.
 const EXACT: f64 = 9e15;
 
 /// The state of one element in one window.
@@ -369,8 +356,7 @@ impl Row {
     }
 
     /// The state of an element in the window `span`.
-    fn state(&self, what: Element, span: Span, lifecycles: &[Arc<str>]) -> ElementState {
-        let lifecycle = (self.lifecycle as usize).checked_sub(1);
+    fn state(&self, what: Element, span: Span, lifecycle: Option<&Arc<str>>) -> ElementState {
         ElementState {
             count: match what {
                 Element::Node(_) => None,
@@ -381,7 +367,7 @@ impl Row {
             hz: self.hz(span),
             median_period_s: self.median.value(),
             max_gap_s: self.gap.value(),
-            lifecycle: lifecycle.and_then(|at| lifecycles.get(at)).map(Arc::clone),
+            lifecycle: lifecycle.map(Arc::clone),
             measures: self.measures(),
             ..ElementState::new(what, self.state, self.confidence)
         }
@@ -594,10 +580,8 @@ impl ColumnCursor<'_> {
             let look = take_byte(bytes);
             let (state, confidence) = (usize::from(look & 15), usize::from(look >> 4));
             row.state = State::ALL.get(state).copied().unwrap_or(row.state);
-            row.confidence = Confidence::ALL
-                .get(confidence)
-                .copied()
-                .unwrap_or(row.confidence);
+            let known = Confidence::ALL.get(confidence);
+            row.confidence = known.copied().unwrap_or(row.confidence);
             row.lifecycle = u32::try_from(take(bytes)).unwrap_or(0);
         }
         if tag & COUNT != 0 {

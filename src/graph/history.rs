@@ -3,19 +3,22 @@
 //!
 //! In: everything recorded, and the findings. Out: a [`History`], made once, from which windows, events, phases and figures
 //! are derived; nothing here depends on windows. Begin with `records`, which calls the others in order: `senders` reads the
-//! times of every topic, `recordings` and `restarts` find pauses and restarts in them, `tracks` collects the signs of each
-//! element, `lifetimes` decides when it existed.
+//! times of every topic, `restarts` and `pauses` find restarts and the pauses of `recordings` in them, `liveness` collects the signs
+//! of each element, `lifetimes` decides when it existed.
 
 mod lifetimes;
+mod liveness;
+mod pauses;
 mod recordings;
 pub(crate) mod records;
 mod restarts;
 pub(crate) mod senders;
-mod tracks;
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
 
 use super::{ById, Element, Elements, Graphs, NodeId, State, TopicId};
 use crate::base::rhythm::{FEWEST, LONGER, OFTEN, SAME_RATE, STEADY, STEADY_NS, broken_after};
@@ -48,7 +51,8 @@ pub struct Life {
 }
 
 /// A run of messages of one sender at one rate, without a gap.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Serialize)]
+#[serde(from = "StretchNumbers", into = "StretchNumbers")]
 pub struct Stretch {
     /// The time of the first message.
     pub first: Stamp,
@@ -62,6 +66,30 @@ pub struct Stretch {
     pub is_even: bool,
     /// Whether the previous stretch ends where this one begins: a change of rate, not a gap.
     pub is_joined: bool,
+}
+
+/// A stretch in JSON: first and last message, their number, the usual period, and 1 for even intervals, plus 2 if it begins
+/// where the previous stretch ends.
+type StretchNumbers = (Stamp, Stamp, u64, i64, u8);
+
+impl From<StretchNumbers> for Stretch {
+    fn from((first, last, count, period, flags): StretchNumbers) -> Self {
+        Self {
+            first,
+            last,
+            count,
+            period,
+            is_even: flags & 1 > 0,
+            is_joined: flags & 2 > 0,
+        }
+    }
+}
+
+impl From<Stretch> for StretchNumbers {
+    fn from(s: Stretch) -> Self {
+        let flags = u8::from(s.is_even) + 2 * u8::from(s.is_joined);
+        (s.first, s.last, s.count, s.period, flags)
+    }
 }
 
 impl Stretch {
@@ -80,16 +108,21 @@ impl Stretch {
 }
 
 /// All messages of one sender on one topic.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[serde(default)]
 #[non_exhaustive]
 pub struct Sender {
     /// The topic.
+    #[serde(skip)]
     pub topic: TopicId,
     /// The publishing node; `None` for all unknown senders together.
+    #[serde(skip)]
     pub node: Option<NodeId>,
     /// Whether its last message is latched.
+    #[serde(rename = "latched", skip_serializing_if = "std::ops::Not::not")]
     pub is_latched: bool,
     /// The stretches of even messages, in order, without overlaps.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stretches: Vec<Stretch>,
 }
 
@@ -237,8 +270,11 @@ pub(crate) struct Transition {
     pub(crate) state: Arc<str>,
 }
 
+/// A silence of a sender, from its last message to the next one; `None` if there is none.
+pub(crate) type Silence = (Stamp, Option<Stamp>);
+
 /// Whether most of a silence lies in pauses of the recording.
-pub(crate) fn hide(pauses: &[Span], (from, to): (Stamp, Option<Stamp>)) -> bool {
+pub(crate) fn hide(pauses: &[Span], (from, to): Silence) -> bool {
     let Some(to) = to else { return false };
     let silence = Span::new(from, to);
     let shared = pauses.iter().map(|pause| pause.shared(silence).max(0));
@@ -247,11 +283,7 @@ pub(crate) fn hide(pauses: &[Span], (from, to): (Stamp, Option<Stamp>)) -> bool 
 
 /// The silences of a sender with a rhythm during its lifetimes (`lives`, half-open) and not in pauses of the recording:
 /// from the last message to the next, or `None` if there is none. A sender of bursts is never silent.
-pub(crate) fn silences(
-    stretches: &[Stretch],
-    lives: &[Span],
-    pauses: &[Span],
-) -> Vec<(Stamp, Option<Stamp>)> {
+pub(crate) fn silences(stretches: &[Stretch], lives: &[Span], pauses: &[Span]) -> Vec<Silence> {
     let mut found = Vec::new();
     for life in lives {
         let inside = |s: &&Stretch| life.start <= s.first && s.first < life.end;
@@ -283,26 +315,16 @@ pub(crate) fn silences(
 }
 
 /// The times at which all of several senders are silent, if at least one has a rhythm that stopped.
-pub(crate) fn all_silent(
-    senders: &[&[Stretch]],
-    lives: &[Span],
-    pauses: &[Span],
-) -> Vec<(Stamp, Option<Stamp>)> {
-    let mut found: Vec<(Stamp, Option<Stamp>)> = Vec::new();
-    for sender in senders {
-        found.extend(silences(sender, lives, pauses));
-    }
+pub(crate) fn all_silent(senders: &[&[Stretch]], lives: &[Span], pauses: &[Span]) -> Vec<Silence> {
+    let found = senders.iter().flat_map(|own| silences(own, lives, pauses));
+    let mut found: Vec<Silence> = found.collect();
     found.sort_unstable();
-    let mut all: Vec<(Stamp, Option<Stamp>)> = Vec::new();
+    let mut all: Vec<Silence> = Vec::new();
     for (from, to) in found {
         // From the last message of any of them to the next of any.
-        let sends = |s: &&Stretch| s.last > from && to.is_none_or(|to| s.first < to);
-        let others = || senders.iter().flat_map(|s| s.iter()).filter(sends);
-        if others().next().is_none()
-            && all
-                .last()
-                .is_none_or(|last| last.1.is_some_and(|end| end <= from))
-        {
+        let sends = |s: &Stretch| s.last > from && to.is_none_or(|to| s.first < to);
+        let is_over = |last: &Silence| last.1.is_some_and(|end| end <= from);
+        if !senders.iter().any(|own| own.iter().any(sends)) && all.last().is_none_or(is_over) {
             all.push((from, to));
         }
     }
@@ -310,7 +332,7 @@ pub(crate) fn all_silent(
 }
 
 /// The most pauses that are kept for each topic; any part of the mission contains one of them, or no pause
-/// longer than those within windows.
+/// longer than those within windows. They are in the JSON of every topic, so that more would make files larger.
 const PAUSES: usize = 32;
 
 /// The longest pauses of one sequence of messages, collected message by message.

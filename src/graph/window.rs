@@ -101,11 +101,9 @@ impl Windows {
 /// # Errors
 /// [`Error::Usage`] if it contains nothing of the bag.
 pub fn range(division: &Division, bag: Span) -> Result<Span> {
-    let start = division
-        .start
-        .map_or(bag.start, |m| m.on(bag))
-        .max(bag.start);
-    let end = division.end.map_or(bag.end, |m| m.on(bag)).min(bag.end);
+    let start = division.start.map_or(bag.start, |m| m.on(bag));
+    let end = division.end.map_or(bag.end, |m| m.on(bag));
+    let (start, end) = (start.max(bag.start), end.min(bag.end));
     if start < end {
         return Ok(Span::new(start, end));
     }
@@ -182,27 +180,21 @@ pub fn divide(division: &Division, span: Span) -> Result<Windows> {
         return Err(too_many(many, nanos));
     }
     let starts = (0..many).map(|k| first.plus(k * step.nanos()));
-    let spans =
-        starts.map(|at| Span::new(at.max(span.start), at.plus(period.nanos()).min(span.end)));
+    let end = |start: Stamp| start.plus(period.nanos()).min(span.end);
     Ok(Windows {
         span,
         period,
         step,
-        spans: spans.collect(),
+        spans: starts
+            .map(|at| Span::new(at.max(span.start), end(at)))
+            .collect(),
     })
 }
 
-/// The windows that begin at the start of `span` and at each of `turns`, sorted; none of them is partial.
-pub(crate) fn at_turns(span: Span, turns: impl Iterator<Item = Stamp>) -> Windows {
-    let turns = turns.filter(|at| span.start < *at && *at < span.end);
-    let starts: Vec<Stamp> = std::iter::once(span.start).chain(turns).collect();
-    let ends = starts.iter().skip(1).copied().chain([span.end]);
-    let spans: Vec<Span> = starts
-        .iter()
-        .zip(ends)
-        .map(|(start, end)| Span::new(*start, end))
-        .filter(|window| window.start < window.end)
-        .collect();
+/// The windows that begin at the start of `span` and at each of `changes`, sorted; none of them is partial.
+pub(crate) fn at_changes(span: Span, changes: impl Iterator<Item = Stamp>) -> Windows {
+    let mut spans = cut_at(span, changes);
+    spans.retain(|window| window.start < window.end);
     let shortest = spans.iter().map(Span::nanos).min().unwrap_or(1);
     let period = Period::from_nanos(shortest.max(1)).unwrap_or(MINUTE);
     Windows {
@@ -211,6 +203,20 @@ pub(crate) fn at_turns(span: Span, turns: impl Iterator<Item = Stamp>) -> Window
         step: period,
         spans,
     }
+}
+
+/// A time cut at the moments that are inside it, sorted.
+pub(crate) fn cut_at(span: Span, moments: impl Iterator<Item = Stamp>) -> Vec<Span> {
+    let inside = moments.filter(|at| span.start < *at && *at < span.end);
+    let starts: Vec<Stamp> = std::iter::once(span.start).chain(inside).collect();
+    between(&starts, span.end)
+}
+
+/// The intervals from each start to the next, the last one to `end`.
+pub(crate) fn between(starts: &[Stamp], end: Stamp) -> Vec<Span> {
+    let ends = starts.iter().skip(1).copied().chain([end]);
+    let pairs = starts.iter().zip(ends);
+    pairs.map(|(start, end)| Span::new(*start, end)).collect()
 }
 
 fn first_start(division: &Division, span: Span, period: Period, step: Period) -> Stamp {
@@ -224,10 +230,8 @@ fn first_start(division: &Division, span: Span, period: Period, step: Period) ->
 }
 
 fn too_many(many: i64, nanos: i64) -> Error {
-    let ladder = short().into_iter().rev().chain([60 * SECOND]).chain(long());
-    let enough = ladder
-        .into_iter()
-        .find(|p| count(nanos, *p) <= budget::WINDOWS);
+    let mut ladder = short().into_iter().rev().chain([60 * SECOND]).chain(long());
+    let enough = ladder.find(|p| count(nanos, *p) <= budget::WINDOWS);
     let enough = enough.unwrap_or_else(|| count(nanos, budget::WINDOWS));
     Error::usage(
         format!("{many} windows are more than {}", budget::WINDOWS),

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use crate::base::cast;
 use crate::base::error::Result;
+use crate::base::ids::Few;
 use crate::base::name::is_quiet;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Confidence;
@@ -48,7 +49,7 @@ pub(crate) fn graphs(
         findings,
         history,
         published: BTreeMap::new(),
-        sent: ById::default(),
+        sent: Few::default(),
     };
     all.topics(recorded).map_err(spool_error)?;
     all.nodes();
@@ -58,6 +59,15 @@ pub(crate) fn graphs(
         graphs: all.graphs.finish(),
         messages: all.messages,
     })
+}
+
+/// A window in which an element exists.
+struct ElementWindow<'a> {
+    at: usize,
+    window: Span,
+    record: &'a Record,
+    /// The strength of the evidence for the element in it.
+    confidence: Confidence,
 }
 
 struct GraphAssembly<'a> {
@@ -71,7 +81,7 @@ struct GraphAssembly<'a> {
     /// The messages of each known publisher on each topic, in windows with any.
     published: BTreeMap<(Name, Name), Column>,
     /// The messages of each known publisher per window.
-    sent: ById<Name, Vec<Sent>>,
+    sent: Few<Name, Vec<Sent>>,
 }
 
 /// The messages of a node in one window.
@@ -138,7 +148,7 @@ impl GraphAssembly<'_> {
         streams: &[usize],
         sums: &[Sums],
     ) -> io::Result<()> {
-        let mut of: ById<Name, Vec<usize>> = ById::default();
+        let mut of: Few<Name, Vec<usize>> = Few::default();
         for stream in streams {
             if let Some(node) = sender(&self.findings.streams[*stream]) {
                 of.grown(node).push(*stream);
@@ -157,91 +167,101 @@ impl GraphAssembly<'_> {
             sent.resize(many, Sent::default());
             let mut column = ColumnWriter::default();
             for sum in own {
-                let window = self.windows.0[sum.window];
-                sent[sum.window].add(&sum.arrivals, window);
-                let row = Row {
-                    count: Some(sum.arrivals.count),
-                    bytes: sum.bytes,
-                    jitter: Number::of(sum.jitter_s),
-                    ..Row::new(State::Active, Confidence::Measured)
-                };
-                column.push(sum.window, row.with_hz(sum.arrivals.hz(window), window));
+                sent[sum.window].add(&sum.arrivals, self.windows.0[sum.window]);
+                // Only topics show these two.
+                let (median, gap) = (Number::Unknown, Number::Unknown);
+                column.push(
+                    sum.window,
+                    Row {
+                        median,
+                        gap,
+                        ..sum.row
+                    },
+                );
             }
             self.published.insert((node, topic), column.finish());
         }
         Ok(())
     }
 
-    fn topic(&mut self, id: TopicId, sums: Option<&[Sums]>) {
-        let what = Element::Topic(id);
-        let Some(record) = self.history.records.of(what) else {
+    /// Sets the rows of an element: `own` is called for every window, with its index, and makes the row from this and the
+    /// element's record in those in which it exists.
+    fn element<T>(
+        &mut self,
+        what: Element,
+        mut own: impl FnMut(&Self, usize) -> T,
+        row: impl Fn(&mut Self, ElementWindow<'_>, T) -> Row,
+    ) {
+        let (history, windows) = (self.history, self.windows.0);
+        let Some(record) = history.records.of(what) else {
             return;
         };
-        let mut list = sums.unwrap_or_default().iter().peekable();
+        let first = history.elements.seen(what).first;
         let mut rows = ColumnWriter::default();
-        for (at, window) in self.windows.0.iter().enumerate() {
-            let sum = list.next_if(|sum| sum.window == at);
-            if !Self::sees(record, *window) {
-                continue;
+        for (at, window) in windows.iter().copied().enumerate() {
+            let own = own(self, at);
+            let is_there = |run: Span| run.start < window.end && window.start < run.end;
+            if record.spans().any(is_there) {
+                // Before its first sign it is inferred to exist.
+                let is_inferred = first.is_some_and(|first| window.end <= first);
+                let seen = ElementWindow {
+                    at,
+                    window,
+                    record,
+                    confidence: match record.confidence {
+                        known if is_inferred => known.max(Confidence::Inferred),
+                        known => known,
+                    },
+                };
+                rows.push(at, row(self, seen, own));
             }
-            let state = Row::new(
-                record.state(*window, sum.is_some()),
-                self.confidence(what, record, *window),
-            );
-            let row = Row {
-                count: Some(sum.map_or(0, |sum| sum.arrivals.count)),
-                bytes: bytes(sum, sums.is_some()),
-                median: Number::of(sum.and_then(|sum| sum.median_period_s)),
-                gap: Number::of(sum.and_then(|sum| sum.max_gap_s)),
-                ..state.with_measures(&Measures {
-                    jitter_s: sum.and_then(|sum| sum.jitter_s),
-                    ..self.measures.of(what, at)
-                })
-            };
-            rows.push(
-                at,
-                match sum {
-                    Some(sum) => row.with_hz(sum.arrivals.hz(*window), *window),
-                    None => row,
-                },
-            );
         }
         self.graphs.element(what, rows);
     }
 
+    fn topic(&mut self, id: TopicId, sums: Option<&[Sums]>) {
+        let what = Element::Topic(id);
+        let mut list = sums.unwrap_or_default().iter().peekable();
+        let own = |_: &Self, at| list.next_if(|sum| sum.window == at);
+        self.element(what, own, |all, seen, sum| {
+            let measures = all.measures.of(what, seen.at);
+            let row = sum.map_or_else(
+                || Row {
+                    count: Some(0),
+                    bytes: sums.map(|_| 0),
+                    ..Row::default()
+                },
+                |sum| sum.row,
+            );
+            Row {
+                state: seen.record.state(seen.window, sum.is_some()),
+                confidence: seen.confidence,
+                drops: measures.drops,
+                age: Number::of(measures.age_s),
+                ..row
+            }
+        });
+    }
+
     fn nodes(&mut self) {
-        for (name, id) in self.history.node_ids.somes() {
-            let what = Element::Node(*id);
-            let Some(record) = self.history.records.of(what) else {
-                continue;
+        let history = self.history;
+        for (name, id) in history.node_ids.somes() {
+            let own = |all: &Self, at| {
+                let sent = all.sent.get(name).filter(|sent| !sent.is_empty());
+                sent.map(|sent| sent[at])
             };
-            let sent = self.sent.get(name).filter(|sent| !sent.is_empty());
-            let mut rows = ColumnWriter::default();
-            for (at, window) in self.windows.0.iter().enumerate() {
-                if !Self::sees(record, *window) {
-                    continue;
-                }
-                let lifecycle = self.findings.values.lifecycle(name, *window);
+            self.element(Element::Node(*id), own, |all, seen, sent| {
+                let ElementWindow { window, .. } = seen;
+                let lifecycle = all.findings.values.lifecycle(name, window);
+                let is_rated = per_second(0, window).is_some();
                 let row = Row {
                     // A node's count only stands for its rate.
-                    count: sent
-                        .filter(|_| per_second(0, *window).is_some())
-                        .map(|of| of[at].count),
-                    lifecycle: lifecycle.map_or(0, |word| self.graphs.lifecycle(&word)),
-                    ..Row::new(
-                        record.state(*window, false),
-                        self.confidence(what, record, *window),
-                    )
+                    count: sent.filter(|_| is_rated).map(|sent| sent.count),
+                    lifecycle: lifecycle.map_or(0, |word| all.graphs.lifecycle(&word)),
+                    ..Row::new(seen.record.state(window, false), seen.confidence)
                 };
-                rows.push(
-                    at,
-                    match sent {
-                        Some(of) => row.with_hz(of[at].hz(*window), *window),
-                        None => row,
-                    },
-                );
-            }
-            self.graphs.element(what, rows);
+                sent.map_or(row, |sent| row.with_hz(sent.hz(window), window))
+            });
         }
     }
 
@@ -251,95 +271,57 @@ impl GraphAssembly<'_> {
         let nodes: ById<NodeId, Name> = nodes.collect();
         let topics = self.history.topic_ids.somes().map(|(name, _)| name);
         let topics: ById<TopicId, Name> = topics.collect();
-        for (id, edge) in self.history.elements.publishes.with_ids() {
+        let (history, published) = (self.history, std::mem::take(&mut self.published));
+        for (id, edge) in history.elements.publishes.with_ids() {
             let what = Element::Publish(id);
-            let Some(record) = self.history.records.of(what) else {
-                continue;
-            };
             let ends = nodes.get(edge.node).zip(topics.get(edge.topic));
-            let sent = ends.and_then(|(node, topic)| self.published.get(&(*node, *topic)));
+            let sent = ends.and_then(|(node, topic)| published.get(&(*node, *topic)));
             let mut sent = sent.map(Column::cursor);
-            let mut rows = ColumnWriter::default();
-            for (at, window) in self.windows.0.iter().enumerate() {
-                let row = sent.as_mut().map(ColumnCursor::next);
+            let own = |_: &Self, _| sent.as_mut().map(ColumnCursor::next);
+            self.element(what, own, |all, seen, row| {
                 let own = row.flatten();
                 let count = row.map(|row| row.and_then(|row| row.count).unwrap_or(0));
-                if !Self::sees(record, *window) {
-                    continue;
-                }
-                let (delivered, bytes) = self.measures.counted(what, at);
-                let measures = self.measures.of(what, at);
+                let (delivered, bytes) = all.measures.counted(what, seen.at);
+                let measures = all.measures.of(what, seen.at);
                 let jitter = own.and_then(|row| row.jitter.value());
-                let state = record.state(*window, count.is_some_and(|n| n > 0));
+                let state = seen.record.state(seen.window, count.is_some_and(|n| n > 0));
                 let row = Row {
                     count: count.or(delivered),
                     bytes: own.and_then(|row| row.bytes).or(bytes),
                     rate: own.and_then(|row| row.rate),
-                    ..Row::new(state, self.confidence(what, record, *window))
+                    ..Row::new(state, seen.confidence)
                 };
-                let measures = Measures {
+                row.with_measures(&Measures {
                     jitter_s: jitter.or(measures.jitter_s),
                     ..measures
-                };
-                rows.push(at, row.with_measures(&measures));
-            }
-            self.graphs.element(what, rows);
+                })
+            });
         }
     }
 
     /// Adds the subscriptions: each has the state of its topic.
     fn subscribes(&mut self) {
-        for (id, edge) in self.history.elements.subscribes.with_ids() {
+        let history = self.history;
+        for (id, edge) in history.elements.subscribes.with_ids() {
             let what = Element::Subscribe(id);
-            let Some(record) = self.history.records.of(what) else {
-                continue;
-            };
-            let mut topic = self.graphs.cursor(Element::Topic(edge.topic));
-            let mut rows = ColumnWriter::default();
-            for (at, window) in self.windows.0.iter().enumerate() {
-                let topic = topic.as_mut().and_then(ColumnCursor::next);
-                if !Self::sees(record, *window) {
-                    continue;
-                }
+            let topic = self.graphs.column(Element::Topic(edge.topic));
+            let mut topic = topic.as_ref().map(Column::cursor);
+            let own = |_: &Self, _| topic.as_mut().and_then(ColumnCursor::next);
+            self.element(what, own, |all, seen, topic| {
                 let state = match topic {
-                    _ if record.is_declared() => State::Declared,
+                    _ if seen.record.is_declared() => State::Declared,
                     Some(row) => row.state,
                     None => State::Silent,
                 };
-                let (count, bytes) = self.measures.counted(what, at);
+                let (count, bytes) = all.measures.counted(what, seen.at);
                 let row = Row {
                     count,
                     bytes,
-                    ..Row::new(state, self.confidence(what, record, *window))
+                    ..Row::new(state, seen.confidence)
                 };
-                let measures = self.measures.of(what, at);
-                rows.push(at, row.with_measures(&measures));
-            }
-            self.graphs.element(what, rows);
+                row.with_measures(&all.measures.of(what, seen.at))
+            });
         }
-    }
-
-    /// The strength of the evidence for an element in a window: before its first sign it is inferred to exist.
-    fn confidence(&self, what: Element, record: &Record, window: Span) -> Confidence {
-        let first = self.history.elements.seen(what).first;
-        if first.is_some_and(|first| window.end <= first) {
-            record.confidence.max(Confidence::Inferred)
-        } else {
-            record.confidence
-        }
-    }
-
-    /// Whether an element with this record exists in a window.
-    fn sees(record: &Record, window: Span) -> bool {
-        let mut runs = record.spans();
-        runs.any(|run| run.start < window.end && window.start < run.end)
-    }
-}
-
-fn bytes(sum: Option<&Sums>, recorded: bool) -> Option<u64> {
-    match sum {
-        Some(sum) => sum.bytes,
-        None => recorded.then_some(0),
     }
 }
 
@@ -512,21 +494,18 @@ fn whole_number(sum: f64) -> u64 {
 // Rates: the messages of some streams per window, their bytes, periods and gaps.
 
 /// The messages of one topic, or of one of its publishers, in one window.
-pub(crate) struct Sums {
-    pub(crate) window: usize,
-    pub(crate) arrivals: Arrivals,
-    pub(crate) bytes: Option<u64>,
-    pub(crate) median_period_s: Option<f64>,
-    pub(crate) max_gap_s: Option<f64>,
-    /// The standard deviation of the time between messages; `None` with fewer than three.
-    pub(crate) jitter_s: Option<f64>,
+struct Sums {
+    window: usize,
+    arrivals: Arrivals,
+    /// Their number, bytes, intervals and rate, of an active element.
+    row: Row,
 }
 
 /// The times of the messages in one window.
 #[derive(Clone, Copy)]
-pub(crate) struct Arrivals {
+struct Arrivals {
     /// The number of messages, ≥ 1.
-    pub(crate) count: u64,
+    count: u64,
     first: Stamp,
     last: Stamp,
     /// The last message before the window, if the pause after it is an ordinary one.
@@ -554,13 +533,13 @@ impl Arrivals {
     }
 
     /// Whether the sending neither begins nor ends in the window.
-    pub(crate) fn fills_window(&self) -> bool {
+    fn fills_window(&self) -> bool {
         self.before.is_some() && self.after.is_some()
     }
 
     /// Messages per second in the part of the window in which they are sent: if the sending begins or ends in it, the
     /// intervals from the first message or to the last one, by the time they take; a single message has no rate there.
-    pub(crate) fn hz(&self, window: Span) -> Option<f64> {
+    fn hz(&self, window: Span) -> Option<f64> {
         let part = |intervals: u64, from: Stamp, to: Stamp| {
             let is_rhythm = self.count > 1;
             rate_between(intervals, Span::new(from, to), window.nanos()).filter(|_| is_rhythm)
@@ -618,11 +597,11 @@ struct OpenWindow {
     gaps: Vec<i64>,
 }
 
-/// The most gaps kept per window for their median (8 MB); a window with more has no median.
+/// The most gaps kept per window for their median (8 MB); a window with more has no median: 1 kHz for 17 minutes.
 const MOST_GAPS: usize = 1 << 20;
 
 /// Counts the messages of some streams, those of a topic or of one of its publishers: each window with messages, in order.
-pub(crate) fn rates(
+fn rates(
     recorded: &Recorded,
     streams: &[usize],
     windows: &SortedWindows<'_>,
@@ -691,13 +670,19 @@ impl OpenWindow {
             after,
             ..self.arrivals
         };
+        let arrivals = arrivals.within(self.span);
+        let row = Row {
+            count: Some(arrivals.count),
+            bytes: sized.then_some(self.bytes),
+            gap: Number::of(self.longest.map(|gap| gap as f64 / 1e9)),
+            jitter: Number::of(deviation(&self.gaps).filter(|_| exact)),
+            median: Number::of(median(&mut self.gaps).filter(|_| exact)),
+            ..Row::default()
+        };
         Sums {
             window: self.window,
-            arrivals: arrivals.within(self.span),
-            bytes: sized.then_some(self.bytes),
-            max_gap_s: self.longest.map(|gap| gap as f64 / 1e9),
-            jitter_s: deviation(&self.gaps).filter(|_| exact),
-            median_period_s: median(&mut self.gaps).filter(|_| exact),
+            arrivals,
+            row: row.with_hz(arrivals.hz(self.span), self.span),
         }
     }
 }

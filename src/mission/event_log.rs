@@ -1,18 +1,19 @@
-//! The events of a mission, in continuous time: one list, made once from the full graph, independent of windows and
-//! views.
+//! The events of a mission, in continuous time: one list, made once from the full graph, independent of windows and views.
 //!
-//! It does not depend on windows. All outputs that show a change (badges, captions, marks, tables, pages, the
-//! log) read it.
+//! In: the elements and the history of a mission. Out: an [`EventLog`], which all outputs read that show a change (badges,
+//! captions, marks, tables, pages), and its text. Begin with [`make`], which calls one file per kind of event and then `causes`,
+//! which leaves one headline per cause; `changes` relates events to windows, `written` and `sentence` print the log.
 
 mod causes;
 mod changes;
-mod from_changes;
-mod hands;
+mod drafts;
+mod handovers;
 mod incidents;
-mod lifetimes;
-mod make;
 mod rates;
+mod sentence;
 mod silence;
+mod starts;
+mod written;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -24,15 +25,29 @@ use crate::base::rhythm::{CLOSE_NS, SWITCH, SWITCH_NS};
 use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
 use crate::evidence::{Confidence, Evidence};
-use crate::graph::{ById, Element, Elements, NodeId};
-use crate::mission::Window;
+use crate::graph::{ById, Element, NodeId};
 
-pub(crate) use changes::{explain, places};
-pub(crate) use from_changes::described;
-pub(crate) use make::{LogInput, make, sorted};
+pub(crate) use changes::{described, explain, from_changes, places};
+pub(crate) use drafts::{LogInput, sorted};
+pub(crate) use sentence::{predicate, sentence, sentence_with};
+pub use written::{LogFormat, LogLine, LogOptions, log};
+pub(crate) use written::{LogRow, body, headlines, lines, quoted, row_lines, whole};
 
-/// The most reconfigurations of a mission: the limit of automatic windows.
-const MOST_TURNS: i64 = crate::base::budget::CHOSEN_WINDOWS;
+/// The most reconfigurations of a mission: as many as automatic windows, so that a film of them has no more frames.
+const MOST: i64 = crate::base::budget::CHOSEN_WINDOWS;
+
+/// Every event of a mission, sorted.
+pub(crate) fn make(context: &LogInput<'_>) -> ById<EventId, Event> {
+    let mut drafts = drafts::Drafts::default();
+    starts::add(context, &mut drafts);
+    silence::add(context, &mut drafts);
+    handovers::add(context, &mut drafts);
+    rates::add(context, &mut drafts);
+    incidents::add_lifecycles(context, &mut drafts);
+    incidents::add(context, &mut drafts);
+    causes::add(context, &mut drafts);
+    sorted(drafts.list, context.elements).0
+}
 
 ids! {
     /// The id of an event: its index in [`EventLog::events`].
@@ -245,11 +260,6 @@ pub struct Phase {
 }
 
 impl EventLog {
-    /// The log from the changes between windows, if nothing more precise is known.
-    pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> Self {
-        from_changes::from_changes(elements, windows)
-    }
-
     /// The word for the element of an event of this kind.
     pub(crate) fn word(&self, kind: Kind) -> &'static str {
         match kind {
@@ -272,44 +282,37 @@ impl EventLog {
     }
 
     /// The times of reconfigurations inside `span`: the first of each group of close headlines.
-    pub fn turns(&self, span: Span) -> Vec<Stamp> {
-        let close = CLOSE_NS.max(span.nanos() / MOST_TURNS);
-        let mut turns = Vec::new();
-        let mut last: Option<Stamp> = None;
-        for (_, event) in self.headlines(span).filter(|(_, e)| !e.kind.is_remark()) {
-            if last.is_none_or(|last| event.time.since(last) > close) {
-                turns.push(event.time);
-            }
-            last = Some(event.time);
-        }
-        turns
+    pub fn reconfigurations(&self, span: Span) -> Vec<Stamp> {
+        let close = CLOSE_NS.max(span.nanos() / MOST);
+        let headlines = self.headlines(span).filter(|(_, e)| !e.kind.is_remark());
+        let times: Vec<Stamp> = headlines.map(|(_, e)| e.time).collect();
+        let groups = times.chunk_by(|a, b| b.since(*a) <= close);
+        groups.map(|group| group[0]).collect()
     }
 
-    /// The robot's mode switches: nodes that stop and others that start within a few seconds.
+    /// The robot's mode switches: nodes that stop and others that start within a few seconds. For example, at 60 s three nodes
+    /// of the navigation stop and within 4 s four of the docking start.
     pub(crate) fn switches(&self) -> Vec<Switch> {
-        let turns = self.events.iter().filter(|e| e.is_headline());
-        let turns = turns.filter(|e| matches!(e.kind, Kind::Started | Kind::Stopped));
-        let turns: Vec<&Event> = turns.collect();
+        let limits = self.events.iter().filter(|e| e.is_headline());
+        let limits = limits.filter(|e| matches!(e.kind, Kind::Started | Kind::Stopped));
+        let limits: Vec<&Event> = limits.collect();
         let mut found: Vec<Switch> = Vec::new();
-        // The first turn, the one after the last within reach, and the stops between them.
+        // The first one, the one after the last within reach, and the stops between them.
         let (mut at, mut end, mut stopped) = (0, 0, 0);
-        while let Some(first) = turns.get(at) {
-            while let Some(next) = turns
-                .get(end)
-                .filter(|e| e.time.since(first.time) <= SWITCH_NS)
-            {
+        while let Some(first) = limits.get(at) {
+            let is_near = |e: &&&Event| e.time.since(first.time) <= SWITCH_NS;
+            while let Some(next) = limits.get(end).filter(is_near) {
                 stopped += usize::from(next.kind == Kind::Stopped);
                 end += 1;
             }
             let many = end - at;
             let (each, all) = SWITCH;
-            let is_switch = stopped.min(many - stopped) >= each && many >= all;
-            found.extend(is_switch.then_some(Switch {
-                time: first.time,
-                stopped,
-                started: many - stopped,
-            }));
-            if is_switch {
+            if stopped.min(many - stopped) >= each && many >= all {
+                found.push(Switch {
+                    time: first.time,
+                    stopped,
+                    started: many - stopped,
+                });
                 (at, stopped) = (end, 0);
             } else {
                 stopped -= usize::from(first.kind == Kind::Stopped);

@@ -1,4 +1,5 @@
-//! The summary of a bag: its contents, the known graph with its evidence, and missing information.
+//! The summary of a bag: its contents, the known graph with its evidence, and missing information. In comes a mission,
+//! out goes an [`Info`], as JSON or text. Begin with [`info`], which fills it; `text` writes it, `survey` has one per bag.
 
 mod advice;
 mod figure;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{Mission, Window};
 use crate::base::time::{Span, Stamp};
+use crate::graph::window::cut_at;
 use crate::graph::{Element, ElementState, Graph};
 
 impl Mission {
@@ -12,17 +13,7 @@ impl Mission {
     /// Changes are those of the log, at their exact times; states are those of the windows that overlap a new one, and
     /// rates are not those of the new windows.
     pub(crate) fn joined(&self, cuts: &[Stamp]) -> Self {
-        let inside = |at: &&Stamp| self.span.start < **at && **at < self.span.end;
-        let starts = [self.span.start]
-            .into_iter()
-            .chain(cuts.iter().filter(inside).copied());
-        let starts: Vec<Stamp> = starts.collect();
-        let ends = starts.iter().skip(1).copied().chain([self.span.end]);
-        let spans = starts
-            .iter()
-            .zip(ends)
-            .map(|(start, end)| Span::new(*start, end));
-        let spans: Vec<Span> = spans.collect();
+        let spans = cut_at(self.span, cuts.iter().copied());
         let mut all: Vec<BTreeMap<Element, ElementState>> = vec![BTreeMap::new(); spans.len()];
         let mut messages = vec![0_u64; spans.len()];
         for (window, graph) in self.each() {
@@ -38,10 +29,9 @@ impl Mission {
                 }
             }
         }
-        let graphs = spans.iter().zip(all).map(|(span, states)| {
-            let states = states.into_values().collect();
-            (*span, Graph { states })
-        });
+        let states = all.into_iter().map(|states| states.into_values().collect());
+        let graphs = states.map(|states| Graph { states });
+        let graphs = spans.iter().copied().zip(graphs);
         let windows = spans.iter().zip(messages).enumerate();
         let window = |(index, (span, messages)): (usize, (&Span, u64))| Window {
             index,

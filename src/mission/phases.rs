@@ -1,4 +1,6 @@
-//! Phases: parts of a mission with one configuration, detected by an optimal partition of lifetimes.
+//! Phases: parts of a mission with one configuration, detected by an optimal partition of lifetimes. In come the
+//! elements with their lifetimes and the names of their topics, out goes a span and a name for each phase. Open
+//! `partition` first: it chooses the boundaries.
 //!
 //! A boundary must save enough *element-seconds* of wrongly drawn graph, so that crashes, restarts and slow topics do
 //! not cause boundaries, and the majority graph of a phase is its configuration. The result depends on the mission
@@ -18,11 +20,13 @@ use self::presence::{Presence, is_topics, presences};
 pub(crate) use self::presence::{fill, knows_publishers};
 use crate::base::time::{Span, Stamp};
 use crate::graph::history::Sending;
+use crate::graph::window::between;
 use crate::graph::{Elements, TopicId};
 use crate::mission::event_log::Phase;
 
 /// The distance from a boundary's cell within which its exact time is searched, in nanoseconds and as a part of the
-/// mission (one in so many).
+/// mission (one in so many): six cells of a short mission, 6 of at most 200 of a long one. A launch file starts its nodes within
+/// that time; farther starts belong to another boundary.
 const AROUND: (i64, i64) = (6_000_000_000, 33);
 
 /// The configuration of a phase: its majority graph.
@@ -55,13 +59,6 @@ pub fn phases(elements: &Elements, sending: &Sending, whole: Span) -> Vec<Phase>
     let (spans, found, ramps) = ramp::joined(&spans, &found, whole.nanos());
     let unit = if is_topics(&present) { "topic" } else { "node" };
     reported(&spans, &found, &ramps, unit)
-}
-
-/// The intervals from each start to the next, the last one to `end`.
-fn between(starts: &[Stamp], end: Stamp) -> Vec<Span> {
-    let ends = starts.iter().skip(1).copied().chain([end]);
-    let pairs = starts.iter().zip(ends);
-    pairs.map(|(start, end)| Span::new(*start, end)).collect()
 }
 
 /// The phases for given intervals, such as the user's, with the changes between them, by majority.

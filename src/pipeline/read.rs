@@ -353,9 +353,9 @@ fn divided(reading: &Reading, span: Span, log: &EventLog) -> Result<Windows> {
         }
         Some(Cut::Phases) => {
             let phases = log.phases.iter().skip(1);
-            window::at_turns(span, phases.map(|phase| phase.span.start))
+            window::at_changes(span, phases.map(|phase| phase.span.start))
         }
-        Some(Cut::Changes) => window::at_turns(span, log.turns(span).into_iter()),
+        Some(Cut::Changes) => window::at_changes(span, log.reconfigurations(span).into_iter()),
     };
     Ok(windows)
 }

@@ -239,7 +239,7 @@ impl<'a> Now<'a> {
             && item.kind != ItemKind::Namespace
         {
             let row = self.rows.of(*node).and_then(Option::as_ref);
-            shown.lifecycle = row.and_then(|row| self.mission.graphs.lifecycle_word(row));
+            shown.lifecycle = row.and_then(|row| self.mission.graphs.lifecycle(row).cloned());
         }
         if !item.is_replica {
             shown.each = 0;

@@ -8,7 +8,7 @@ use clap::Args;
 use super::values::{length, one_of, period};
 use crate::base::time::Period;
 use crate::graph::window::Length;
-use crate::mission::events::LogFormat;
+use crate::mission::event_log::LogFormat;
 
 #[derive(Debug, Args)]
 pub(crate) struct FollowArgs {

@@ -11,7 +11,7 @@ use crate::base::words::{self, worded};
 use crate::graph::{Element, NodeId};
 use crate::mission::EventId;
 use crate::mission::event_log::{Detail, Event, Kind, Parts};
-use crate::mission::events::{predicate, sentence};
+use crate::mission::event_log::{predicate, sentence};
 
 /// The most letters, and the most arrows: more crowd the rows. Other events are marked by a small circle.
 const MOST: (usize, usize) = (10, 6);

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use crate::evidence::code::declaration::{Call, Class, Classes, FileCode, Made, short, type_of};
 use crate::evidence::code::declaration::{LONGEST, TextValues};
-use crate::evidence::syntax::{Language, Node, Parsed, arguments, children, line, walk};
+use crate::evidence::syntax::{Language, Node, Parsed, arguments, children, fields, line, walk};
 
 /// Every file with declarations contains at least one of these words; other files are not parsed. They include classes,
 /// as a node may derive from them.
@@ -196,8 +196,7 @@ impl<'a> CppReader<'a> {
 
     /// Records an assignment to a name.
     fn set(&mut self, node: Node<'a>, name: &str, value: &str) {
-        let sides = [name, value].map(|side| node.child_by_field_name(side));
-        if let [Some(name), Some(value)] = sides {
+        if let Some([name, value]) = fields(node, [name, value]) {
             let name = self
                 .text(name)
                 .trim_end_matches("[]")
@@ -248,8 +247,7 @@ impl<'a> CppReader<'a> {
     }
 
     fn member(&mut self, node: Node<'a>) {
-        let parts = ["type", "declarator"].map(|name| node.child_by_field_name(name));
-        if let [Some(kind), Some(mut declarator)] = parts {
+        if let Some([kind, mut declarator]) = fields(node, ["type", "declarator"]) {
             while let Some(inner) = declarator.child_by_field_name("declarator") {
                 declarator = inner;
             }
@@ -629,7 +627,7 @@ struct Aliases {
     open: Vec<String>,
 }
 
-/// The most steps from alias to alias that are followed, as aliases may be circular.
+/// The most steps from alias to alias that are followed, as aliases may be circular: code in use takes two.
 const DEEPEST: usize = 8;
 
 impl Aliases {
@@ -769,8 +767,8 @@ impl<'a> CppReader<'a> {
             "identifier" | "field_identifier" => again(self.texts.get(self.text(node))?),
             "field_expression" => again(self.texts.get(self.field(node, "field"))?),
             "binary_expression" if self.field(node, "operator") == "+" => {
-                let sides = ["left", "right"].map(|side| node.child_by_field_name(side));
-                Some(again(sides[0]?)? + &again(sides[1]?)?)
+                let [left, right] = fields(node, ["left", "right"])?;
+                Some(again(left)? + &again(right)?)
             }
             "call_expression" => {
                 let callee = Callee::of(self.parsed, node);

@@ -20,10 +20,7 @@ worded! {
 impl Role {
     /// The edge of a node in this role.
     pub(super) fn edge(self, node: Name, topic: Name) -> ElementKey {
-        match self {
-            Self::Publishes => ElementKey::Publish(node, topic),
-            Self::Subscribes => ElementKey::Subscribe(topic, node),
-        }
+        ElementKey::edge(self == Self::Publishes, node, topic)
     }
 }
 
@@ -261,7 +258,7 @@ pub(super) fn short(text: &str) -> String {
 /// The longest text that is assembled, in bytes: longer than any topic.
 pub(super) const LONGEST: usize = 1000;
 
-/// The most steps from name to name that are followed.
+/// The most steps from name to name that are followed, as names may be circular: code in use takes three.
 pub(super) const DEEPEST: usize = 8;
 
 /// Names with the expressions assigned to them; a name with several has no known value.

@@ -33,13 +33,13 @@ pub(super) enum FileKind {
 /// The longest file that is read, in bytes: longer ones are generated or data.
 const LONGEST: u64 = 600_000;
 
-/// The most files that are read.
+/// The most files that are read: five times those of the largest workspace seen; a folder of everything, such as `/`, has more.
 pub(super) const MOST_FILES: usize = 50_000;
 
 /// The most text that is read, in bytes: ten times the largest workspace seen.
 pub(super) const MOST_BYTES: usize = 200 << 20;
 
-/// The deepest nesting of folders that is entered, as folders may be mounted in circles.
+/// The deepest nesting of folders that is entered, as folders may be mounted in circles: workspaces nest a dozen deep.
 const DEEPEST: usize = 40;
 
 /// Folders with built, fetched or hidden files.

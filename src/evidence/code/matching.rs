@@ -102,16 +102,14 @@ fn draw_named(
 ) -> NamedCode {
     let mut by_name: BTreeMap<&str, Vec<&Instance>> = BTreeMap::new();
     for instance in &code.instances {
-        by_name
-            .entry(last_part(&instance.name))
-            .or_default()
-            .push(instance);
+        let own = by_name.entry(last_part(&instance.name)).or_default();
+        own.push(instance);
     }
     let mut all = NamedCode::default();
     for (text, (node, words)) in named {
-        let candidates = by_name
-            .get(last_part(text))
-            .or_else(|| by_name.get(without_numbers(last_part(text))));
+        let name = last_part(text);
+        let candidates = by_name.get(name);
+        let candidates = candidates.or_else(|| by_name.get(without_numbers(name)));
         let Some(candidates) = candidates else {
             all.without.push(text.clone());
             continue;
@@ -132,7 +130,7 @@ fn draw_named(
     all
 }
 
-/// The most nodes without code that are named.
+/// The most nodes without code that are named: as many as fit in two lines of a terminal.
 const MOST_NAMES: usize = 8;
 
 /// `412 files of 6 packages read; 22 edges for 4 named nodes; 6 declarations not drawn (4: …, 2:
@@ -158,18 +156,11 @@ fn summary(
         for (reason, _) in undrawn {
             *reasons.entry(*reason).or_default() += 1;
         }
-        let reasons: Vec<String> = reasons
-            .iter()
-            .map(|(r, n)| format!("{n}: {}", r.word()))
-            .collect();
-        text.extend([
-            "; ",
-            &count(undrawn.len(), "place"),
-            " not drawn (",
-            &reasons.join(", "),
-            ")",
-        ]);
-        text.push_str("; `bagreel info --source` lists them");
+        let reasons = reasons.iter().map(|(r, n)| format!("{n}: {}", r.word()));
+        let reasons = reasons.collect::<Vec<_>>().join(", ");
+        let places = count(undrawn.len(), "place");
+        text.extend(["; ", &places, " not drawn (", &reasons]);
+        text += "); `bagreel info --source` lists them";
     }
     Notice::new(NoticeKind::Note, text)
 }
@@ -205,23 +196,18 @@ fn remarks_on(instance: &Instance, node: &str, recorded: &RecordedTopics) -> Vec
 
 impl RecordedTopics {
     fn of(known: &Conclusions<'_>) -> Self {
+        let proved = known.inferences.iter();
+        let proved = proved.filter(|p| p.confidence != Confidence::Declared);
         let mut all = Self {
             topics: BTreeMap::new(),
             stated: BTreeSet::new(),
-            proved: known
-                .inferences
-                .iter()
-                .filter(|p| p.confidence != Confidence::Declared)
-                .map(|p| p.what)
-                .collect(),
+            proved: proved.map(|p| p.what).collect(),
         };
         for stream in known.streams {
             // Some programs write their own bags, with names as in the code.
             let topic = format!("/{}", known.text(stream.topic).trim_start_matches('/'));
-            let (_, types) = all
-                .topics
-                .entry(topic)
-                .or_insert_with(|| (stream.topic, BTreeSet::new()));
+            let of = all.topics.entry(topic);
+            let (_, types) = of.or_insert_with(|| (stream.topic, BTreeSet::new()));
             types.insert(type_key(&stream.connection.type_name));
             if stream.publisher.is_some() {
                 all.stated.insert(stream.topic);
@@ -236,10 +222,10 @@ impl RecordedTopics {
             let declaration = &placed.declaration;
             let name = named_topic(instance, node, declaration);
             let recorded = name.and_then(|name| self.topics.get(&name));
-            let is_known = !declaration.types.is_empty();
-            is_known
-                && recorded
-                    .is_some_and(|(_, kinds)| !declaration.types.iter().any(|t| kinds.contains(t)))
+            let differs = |(_, kinds): &(_, BTreeSet<String>)| {
+                !declaration.types.iter().any(|t| kinds.contains(t))
+            };
+            !declaration.types.is_empty() && recorded.is_some_and(differs)
         })
     }
 
@@ -259,17 +245,13 @@ fn named(known: &Conclusions<'_>) -> NamedNodes {
     let launch = source_id("launch");
     let is_named = |p: &&Inference| p.confidence != Confidence::Declared || p.source == launch;
     for inference in known.inferences.iter().filter(is_named) {
-        let node = match inference.what {
-            ElementKey::Node(node)
-            | ElementKey::Publish(node, _)
-            | ElementKey::Subscribe(_, node) => node,
-            ElementKey::Topic(_) => continue,
+        let [Some(node), _] = inference.what.ends() else {
+            continue;
         };
         let text = known.text(node);
         if !is_recorder(&text) && !is_player(&text) {
-            let (_, words) = named
-                .entry(text.to_string())
-                .or_insert((node, BTreeSet::new()));
+            let of = named.entry(text.to_string());
+            let (_, words) = of.or_insert((node, BTreeSet::new()));
             words.extend([source_word(inference.source)]);
         }
     }
@@ -302,10 +284,8 @@ fn best<'a>(candidates: &[&'a Instance], node: &str, recorded: &RecordedTopics) 
     let is_in = |m: &Match<'_>, all: &[Match<'_>]| {
         all.iter().any(|o| (o.role, o.topic) == (m.role, m.topic))
     };
-    let common = first
-        .iter()
-        .filter(|m| others.iter().all(|all| is_in(m, all)));
-    common.cloned().collect()
+    let is_common = |m: &&Match<'_>| others.iter().all(|all| is_in(m, all));
+    first.iter().filter(is_common).cloned().collect()
 }
 
 /// The edges of an instance that are confirmed by the bag's topics, if it ran under this name; one per role and topic.
@@ -455,32 +435,25 @@ fn infer_only(code: &Code, known: &mut Conclusions<'_>, bag: &BagTopics<'_>) -> 
     let launches = Launches::new(code, bag.named, &candidates);
     let mut by_edge: BTreeMap<(Role, Name), Vec<&Candidate<'_>>> = BTreeMap::new();
     for candidate in &candidates {
-        by_edge
-            .entry((candidate.found.role, candidate.found.topic))
-            .or_default()
-            .push(candidate);
+        let edge = (candidate.found.role, candidate.found.topic);
+        by_edge.entry(edge).or_default().push(candidate);
     }
-    let judged: Vec<_> = by_edge
-        .into_iter()
-        .map(|(edge, candidates)| {
-            let reason = reason(&candidates, known, bag, (&places[&edge], &launches));
-            (edge.0, reason, candidates)
-        })
-        .collect();
-    let disputed: BTreeSet<&str> = judged
-        .iter()
-        .filter(|(role, reason, _)| {
-            let is_other = [NotDrawn::SeveralPlaces, NotDrawn::KnownPublisher];
-            *role == Role::Publishes && reason.is_some_and(|reason| is_other.contains(&reason))
-        })
-        .flat_map(|(.., candidates)| candidates.iter().map(|c| c.node.as_str()))
-        .collect();
+    let judged = by_edge.into_iter().map(|(edge, candidates)| {
+        let reason = reason(&candidates, known, bag, (&places[&edge], &launches));
+        (edge.0, reason, candidates)
+    });
+    let judged: Vec<_> = judged.collect();
+    let others = [NotDrawn::SeveralPlaces, NotDrawn::KnownPublisher];
+    let disputed = judged.iter().filter(|(role, reason, _)| {
+        *role == Role::Publishes && reason.is_some_and(|reason| others.contains(&reason))
+    });
+    let disputed = disputed.flat_map(|(.., candidates)| candidates);
+    let disputed: BTreeSet<&str> = disputed.map(|c| c.node.as_str()).collect();
     let (mut edges, mut undrawn) = (0, Vec::new());
     for (_, reason, candidates) in &judged {
-        let best = candidates
-            .iter()
-            .find(|c| launches.are_best_for(c.found.instance))
-            .unwrap_or(&candidates[0]);
+        let mut best = candidates.iter();
+        let best = best.find(|c| launches.are_best_for(c.found.instance));
+        let best = best.unwrap_or(&candidates[0]);
         let is_disputed = reason.is_none() && disputed.contains(best.node.as_str());
         match reason.or(is_disputed.then_some(NotDrawn::Disputed)) {
             None if code.infers => {
@@ -498,21 +471,16 @@ fn infer_only(code: &Code, known: &mut Conclusions<'_>, bag: &BagTopics<'_>) -> 
 /// is nothing else.
 fn candidates<'a>(code: &'a Code, bag: &BagTopics<'_>) -> Vec<Candidate<'a>> {
     let mut all = Vec::new();
-    for instance in code
-        .instances
-        .iter()
-        .filter(|i| !bag.explained.contains(&i.program))
-    {
+    let instances = code.instances.iter();
+    for instance in instances.filter(|i| !bag.explained.contains(&i.program)) {
         let node = full_name(instance);
         if bag.named.contains(&node) {
             continue;
         }
         let found = matches(instance, &node, bag.recorded);
-        let topics = instance.declared.iter().filter_map(|p| {
-            Some((
-                p.declaration.role,
-                resolved(&node, p.declaration.topic.as_ref()?),
-            ))
+        let topics = instance.declared.iter().filter_map(|placed| {
+            let Declaration { role, topic, .. } = &placed.declaration;
+            Some((role, resolved(&node, topic.as_ref()?)))
         });
         let share = (found.len(), topics.collect::<BTreeSet<_>>().len());
         all.extend(found.into_iter().map(|found| Candidate {
@@ -539,24 +507,18 @@ fn places<'a>(
     recorded: &RecordedTopics,
     candidates: &[Candidate<'a>],
 ) -> BTreeMap<(Role, Name), BTreeSet<(&'a str, usize)>> {
-    let mut all: BTreeMap<_, BTreeSet<_>> = BTreeMap::new();
-    for Candidate { found, .. } in candidates {
-        let place = (found.placed.path.as_str(), found.placed.declaration.line);
-        all.entry((found.role, found.topic))
-            .or_default()
-            .insert(place);
+    let found = candidates.iter().map(|c| (c.found.topic, c.found.placed));
+    let all = code.places.iter().filter_map(|placed| {
+        let Declaration { topic, types, .. } = &placed.declaration;
+        let name = resolved("/node", topic.as_ref()?);
+        Some((recorded.topic(&name, types)?, placed))
+    });
+    let mut places: BTreeMap<_, BTreeSet<_>> = BTreeMap::new();
+    for (topic, FileDeclaration { path, declaration }) in found.chain(all) {
+        let of = places.entry((declaration.role, topic)).or_default();
+        of.insert((path.as_str(), declaration.line));
     }
-    for FileDeclaration { path, declaration } in &code.places {
-        let topic = declaration.topic.as_ref();
-        let name = topic.map(|topic| resolved("/node", topic));
-        if let Some(topic) = name.and_then(|name| recorded.topic(&name, &declaration.types)) {
-            let edge = (declaration.role, topic);
-            all.entry(edge)
-                .or_default()
-                .insert((path.as_str(), declaration.line));
-        }
-    }
-    all
+    places
 }
 
 /// A launch file compared with the bag.
@@ -630,17 +592,12 @@ impl<'a> Launches<'a> {
     /// nodes. A robot and its simulation, or two controllers, are such alternatives.
     fn do_without(&self, program: &(String, String)) -> bool {
         let starts = |fit: &&LaunchFit<'_>| fit.programs.contains(program);
-        let with: BTreeSet<_> = self
-            .fits
-            .values()
-            .filter(starts)
-            .flat_map(|fit| &fit.programs)
-            .collect();
+        let with = self.fits.values().filter(starts);
+        let with: BTreeSet<_> = with.flat_map(|fit| &fit.programs).collect();
         let shows = |fit: &&LaunchFit<'_>| !fit.named.is_empty() || !fit.edges.is_empty();
         let without = self.fits.values().filter(shows).filter(|fit| !starts(fit));
-        without
-            .flat_map(|fit| &fit.programs)
-            .any(|p| with.contains(p))
+        let mut others = without.flat_map(|fit| &fit.programs);
+        others.any(|p| with.contains(p))
     }
 }
 
@@ -668,13 +625,10 @@ fn reason(
     if found.role == Role::Publishes && owner.is_some_and(|owner| !is_owner(&owner)) {
         return Some(NotDrawn::OwnedType);
     }
-    let is_launched = candidates
-        .iter()
-        .any(|c| c.found.instance.launched.is_some());
-    let fitting: Vec<_> = candidates
-        .iter()
-        .filter(|c| !is_launched || launches.are_best_for(c.found.instance))
-        .collect();
+    let mut instances = candidates.iter().map(|c| c.found.instance);
+    let is_launched = instances.any(|instance| instance.launched.is_some());
+    let fits = |c: &&&Candidate<'_>| !is_launched || launches.are_best_for(c.found.instance);
+    let fitting: Vec<_> = candidates.iter().filter(fits).collect();
     let nodes: BTreeSet<&str> = fitting.iter().map(|c| c.node.as_str()).collect();
     if places.len() > 1 || nodes.len() > 1 {
         return Some(NotDrawn::SeveralPlaces);
@@ -700,12 +654,8 @@ fn reason(
 /// Whether the calls of a program are those of ROS 1 and the bag is of ROS 2, or the reverse.
 fn is_of_other_ros(instance: &Instance, known: &Conclusions<'_>) -> bool {
     const ROS1: [&str; 4] = ["advertise", "subscribe", "Publisher(", "Subscriber("];
-    let texts = || {
-        instance
-            .declared
-            .iter()
-            .map(|d| d.declaration.text.as_str())
-    };
+    let declared = instance.declared.iter();
+    let texts = || declared.clone().map(|d| d.declaration.text.as_str());
     let is_ros2 = texts().any(|text| text.starts_with("create_"));
     let is_ros1 = !is_ros2 && texts().any(|text| ROS1.iter().any(|call| text.starts_with(call)));
     if known.is_ros1() { is_ros2 } else { is_ros1 }

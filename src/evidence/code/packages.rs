@@ -72,22 +72,19 @@ fn entry_points(text: &str, folder: &str) -> Vec<(String, Program)> {
         let (name, target) = piece.split_once('=')?;
         let (module, _) = target.split_once(':')?;
         let (name, module) = (name.trim(), module.trim());
-        let is_word = |word: &str| {
-            !word.is_empty()
-                && word
-                    .chars()
-                    .all(|c| c.is_alphanumeric() || "_-.".contains(c))
-        };
+        let is_part = |c: char| c.is_alphanumeric() || "_-.".contains(c);
+        let is_word = |word: &str| !word.is_empty() && word.chars().all(is_part);
         let file = format!("{folder}{}.py", module.replace('.', "/"));
         (is_word(name) && is_word(module)).then(|| (name.to_owned(), Program::Files(vec![file])))
     };
     pieces.filter_map(entry).collect()
 }
 
-/// The most variables and sources of a `CMakeLists.txt` that are kept.
+/// The most variables and sources of a `CMakeLists.txt` that are kept: a hundred times those of large packages; lists of lists would
+/// grow without it.
 const MOST: usize = 10_000;
 
-/// The most text in the variables of a `CMakeLists.txt`, in bytes.
+/// The most text in the variables of a `CMakeLists.txt`, in bytes: variables that repeat each other double with each line.
 const MOST_TEXT: usize = 4 << 20;
 
 /// The executables that a `CMakeLists.txt` builds.
@@ -97,12 +94,9 @@ fn cmake(file: &SourceFile, package: &str, paths: &[&str]) -> Vec<(String, Progr
     let mut programs = Vec::new();
     let mut left = MOST_TEXT;
     for (command, words) in commands(&file.text) {
-        let words: Vec<String> = words
-            .iter()
-            .flat_map(|w| put_in(w, &variables, &mut left))
-            .take(MOST)
-            .collect();
-        let (Some(first), rest) = (words.first(), words.get(1..).unwrap_or_default()) else {
+        let words = words.iter().flat_map(|w| put_in(w, &variables, &mut left));
+        let words: Vec<String> = words.take(MOST).collect();
+        let Some((first, rest)) = words.split_first() else {
             continue;
         };
         match command.to_lowercase().as_str() {
@@ -113,20 +107,16 @@ fn cmake(file: &SourceFile, package: &str, paths: &[&str]) -> Vec<(String, Progr
                 variables.insert(first.clone(), rest.join(";"));
             }
             "file" if first.starts_with("GLOB") => {
-                let found = rest
-                    .iter()
-                    .skip(1)
-                    .flat_map(|pattern| glob(pattern, here, paths));
+                let patterns = rest.iter().skip(1);
+                let found = patterns.flat_map(|pattern| glob(pattern, here, paths));
                 let value: Vec<String> = found.take(MOST).collect();
                 variables.insert(rest.first().cloned().unwrap_or_default(), value.join(";"));
             }
             "rclcpp_components_register_node" => programs.extend(component(rest)),
             name if name.ends_with("add_executable") || name == "add_rostest_gtest" => {
-                let sources = rest
-                    .iter()
-                    .filter(|w| w.contains('.'))
-                    .map(|w| located(here, w));
-                programs.push((first.clone(), Program::Files(sources.collect())));
+                let sources = rest.iter().filter(|w| w.contains('.'));
+                let sources = sources.map(|w| located(here, w)).collect();
+                programs.push((first.clone(), Program::Files(sources)));
             }
             _ => {}
         }
@@ -136,28 +126,22 @@ fn cmake(file: &SourceFile, package: &str, paths: &[&str]) -> Vec<(String, Progr
 
 /// `rclcpp_components_register_node(library PLUGIN "package::Class" EXECUTABLE name)`
 fn component(words: &[String]) -> Option<(String, Program)> {
-    let behind = |key: &str| {
-        words
-            .iter()
-            .position(|w| w == key)
-            .and_then(|at| words.get(at + 1))
-    };
+    let behind = |key: &str| words.get(words.iter().position(|w| w == key)? + 1);
     let class = behind("PLUGIN")?.rsplit("::").next()?.to_owned();
     Some((behind("EXECUTABLE")?.clone(), Program::Class(class)))
 }
 
 /// A source file below the workspace.
 fn located(here: &str, source: &str) -> String {
-    let source = [
+    let own = [
         "${CMAKE_CURRENT_SOURCE_DIR}/",
         "${PROJECT_SOURCE_DIR}/",
         "./",
-    ]
-    .iter()
-    .fold(source, |source, start| {
+    ];
+    let below = own.iter().fold(source, |source, start| {
         source.strip_prefix(start).unwrap_or(source)
     });
-    format!("{here}{source}")
+    format!("{here}{below}")
 }
 
 /// The files that match `src/*.cpp`, relative to `here`.
@@ -166,14 +150,12 @@ fn glob(pattern: &str, here: &str, paths: &[&str]) -> Vec<String> {
         return vec![pattern.to_owned()];
     };
     let start = located(here, start);
+    let end = end.trim_start_matches('*');
     let matching = paths
         .iter()
-        .filter(|p| p.starts_with(&start) && p.ends_with(end.trim_start_matches('*')));
-    matching
-        .take(MOST)
-        .filter_map(|p| p.strip_prefix(here))
-        .map(str::to_owned)
-        .collect()
+        .filter(|p| p.starts_with(&start) && p.ends_with(end));
+    let below = matching.take(MOST).filter_map(|p| p.strip_prefix(here));
+    below.map(str::to_owned).collect()
 }
 
 /// A word with its variables replaced and lists split; unknown variables stay as written.
@@ -213,13 +195,10 @@ fn commands(text: &str) -> Vec<(&str, Vec<&str>)> {
         }
         let end = closing(after).unwrap_or(after.len());
         let inside = &after[..end];
-        let words = inside
-            .lines()
-            .map(|line| line.split('#').next().unwrap_or_default());
-        let words = words
-            .flat_map(|line| line.split([' ', '\t', '"', '(', ')', '\r']))
-            .filter(|w| !w.is_empty());
-        found.push((line.trim(), words.collect()));
+        let lines = inside.lines();
+        let lines = lines.map(|line| line.split('#').next().unwrap_or_default());
+        let words = lines.flat_map(|line| line.split([' ', '\t', '"', '(', ')', '\r']));
+        found.push((line.trim(), words.filter(|w| !w.is_empty()).collect()));
         rest = after.get(end + 1..).unwrap_or_default();
     }
     found

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::declaration::{
     Call, Class, Classes, DEEPEST, Declaration, FileCode, LONGEST, Made, TextValues, short, type_of,
 };
-use crate::evidence::syntax::{Language, Node, Parsed, arguments, children, line, walk};
+use crate::evidence::syntax::{Language, Node, Parsed, arguments, children, fields, line, walk};
 
 /// Reads a file; empty if it is too deeply nested.
 pub(super) fn read(text: &str) -> FileCode {
@@ -44,8 +44,9 @@ struct PythonReader<'a> {
     bound: BTreeMap<&'a str, Node<'a>>,
 }
 
-/// The most iterations of the loops around a call that are followed: nested loops multiply them.
-const MOST_TURNS: usize = 64;
+/// The most iterations of the loops around a call that are followed: nested loops multiply them, and lists of topics in code have
+/// at most some dozen.
+const MOST_ITERATIONS: usize = 64;
 
 impl<'a> PythonReader<'a> {
     /// Visits every element inside its classes.
@@ -77,8 +78,7 @@ impl<'a> PythonReader<'a> {
                 self.import(node, module);
             }
             "assignment" => {
-                let sides = ["left", "right"].map(|side| node.child_by_field_name(side));
-                if let [Some(left), Some(right)] = sides {
+                if let Some([left, right]) = fields(node, ["left", "right"]) {
                     self.texts.set(self.text(left), right);
                 }
             }
@@ -87,14 +87,13 @@ impl<'a> PythonReader<'a> {
                     "for_statement" => node.child_by_field_name("body"),
                     _ => node.parent(),
                 };
-                let sides = ["left", "right"].map(|side| node.child_by_field_name(side));
-                if let (Some(repeated), [Some(left), Some(right)]) = (repeated, sides) {
+                let sides = fields(node, ["left", "right"]);
+                if let Some((repeated, [left, right])) = repeated.zip(sides) {
                     self.loops.push((repeated.byte_range(), left, right));
                 }
             }
             "default_parameter" | "typed_default_parameter" => {
-                let sides = ["name", "value"].map(|side| node.child_by_field_name(side));
-                if let [Some(name), Some(value)] = sides {
+                if let Some([name, value]) = fields(node, ["name", "value"]) {
                     self.texts.set(self.text(name), value);
                 }
             }
@@ -113,22 +112,13 @@ impl<'a> PythonReader<'a> {
     }
 
     fn define(&mut self, node: Node<'a>) {
-        let field = |name| node.child_by_field_name(name);
-        let bases = field("superclasses").map(children).unwrap_or_default();
-        let last = |node: Node<'a>| {
-            self.text(node)
-                .rsplit('.')
-                .next()
-                .unwrap_or_default()
-                .to_owned()
-        };
+        let bases = node.child_by_field_name("superclasses").map(children);
+        let bases = bases.into_iter().flatten();
+        let bases = bases.filter(|base| base.kind() != "keyword_argument");
+        let last = |name: &str| name.rsplit('.').next().unwrap_or_default().to_owned();
         self.classes.all.push(Class {
             name: self.parsed.field(node, "name").to_owned(),
-            bases: bases
-                .into_iter()
-                .filter(|b| b.kind() != "keyword_argument")
-                .map(last)
-                .collect(),
+            bases: bases.map(|base| last(self.text(base))).collect(),
             is_defined: true,
             line: line(node),
             ..Class::default()
@@ -136,10 +126,8 @@ impl<'a> PythonReader<'a> {
     }
 
     fn import(&mut self, node: Node<'a>, module: &str) {
-        if children(node)
-            .iter()
-            .any(|child| child.kind() == "wildcard_import")
-        {
+        let is_wildcard = |child: &Node<'_>| child.kind() == "wildcard_import";
+        if children(node).iter().any(is_wildcard) {
             self.wildcards.push(module.to_owned());
         }
         let mut cursor = node.walk();
@@ -150,21 +138,14 @@ impl<'a> PythonReader<'a> {
                 _ => (self.text(name), None),
             };
             // `import a.b` binds `a`.
-            let bound = alias.or_else(|| {
-                if module.is_empty() {
-                    full.split('.').next()
-                } else {
-                    Some(full)
-                }
-            });
-            let stands_for = match (module.is_empty(), alias) {
-                (true, None) => bound.unwrap_or_default().to_owned(),
-                (true, Some(_)) => full.to_owned(),
-                (false, _) if module.ends_with('.') => format!("{module}{full}"),
-                (false, _) => format!("{module}.{full}"),
+            let first = full.split('.').next().unwrap_or_default();
+            let (bound, stands_for) = match (module, alias) {
+                ("", None) => (first, first.to_owned()),
+                ("", Some(alias)) => (alias, full.to_owned()),
+                _ if module.ends_with('.') => (alias.unwrap_or(full), format!("{module}{full}")),
+                _ => (alias.unwrap_or(full), format!("{module}.{full}")),
             };
-            self.imports
-                .insert(bound.unwrap_or_default().to_owned(), stands_for);
+            self.imports.insert(bound.to_owned(), stands_for);
         }
     }
 
@@ -190,8 +171,8 @@ impl<'a> PythonReader<'a> {
         self.remark(name, object, &full, &given);
         if let Some(made) = made(name, &full) {
             let mut declared: Vec<Declaration> = Vec::new();
-            for turn in self.turns(node) {
-                self.bound = turn;
+            for values in self.iterations(node) {
+                self.bound = values;
                 let call = Call {
                     made,
                     topic: self.topic(&given),
@@ -199,11 +180,9 @@ impl<'a> PythonReader<'a> {
                     line: line(node),
                     text: short(&format!("{name}{}", self.parsed.field(node, "arguments"))),
                 };
-                let new = call.declarations().into_iter();
-                declared.extend(
-                    new.filter(|one| !declared.contains(one))
-                        .collect::<Vec<_>>(),
-                );
+                let mut new = call.declarations();
+                new.retain(|one| !declared.contains(one));
+                declared.extend(new);
             }
             self.bound.clear();
             self.classes.current().declarations.extend(declared);
@@ -212,33 +191,30 @@ impl<'a> PythonReader<'a> {
 
     /// The values of the variables of the loops around an element, for each iteration; a single empty entry
     /// outside of loops.
-    fn turns(&self, node: Node<'a>) -> Vec<BTreeMap<&'a str, Node<'a>>> {
-        let mut turns = vec![BTreeMap::new()];
+    fn iterations(&self, node: Node<'a>) -> Vec<BTreeMap<&'a str, Node<'a>>> {
+        let mut iterations = vec![BTreeMap::new()];
         let around = self.loops.iter();
         for (_, left, right) in around.filter(|(body, ..)| body.contains(&node.start_byte())) {
             let items = self.items(*right, 0);
-            if items.is_empty() || items.len() * turns.len() > MOST_TURNS {
+            if items.is_empty() || items.len() * iterations.len() > MOST_ITERATIONS {
                 continue;
             }
-            let with = |turn: &BTreeMap<&'a str, Node<'a>>, item: Node<'a>| {
-                let mut turn = turn.clone();
-                let targets = match left.kind() {
-                    "identifier" => vec![(*left, item)],
-                    _ => children(*left).into_iter().zip(parts(item)).collect(),
-                };
-                turn.extend(
-                    targets
-                        .into_iter()
-                        .map(|(name, value)| (self.text(name), value)),
-                );
-                turn
+            let with = |iteration: &BTreeMap<&'a str, Node<'a>>, item: Node<'a>| {
+                let mut iteration = iteration.clone();
+                if left.kind() == "identifier" {
+                    iteration.insert(self.text(*left), item);
+                } else {
+                    let names = children(*left).into_iter().map(|name| self.text(name));
+                    iteration.extend(names.zip(parts(item)));
+                }
+                iteration
             };
-            let next = turns
+            let next = iterations
                 .iter()
-                .flat_map(|turn| items.iter().map(move |item| with(turn, *item)));
-            turns = next.collect();
+                .flat_map(|iteration| items.iter().map(move |item| with(iteration, *item)));
+            iterations = next.collect();
         }
-        turns
+        iterations
     }
 
     /// The items of the literal that a loop iterates over, or of the one that a name refers to.

@@ -68,7 +68,7 @@ struct CodeNode {
 /// Base classes that make a class a node.
 const NODES: &[&str] = &["LifecycleNode", "ManagedNode", "Node", "Nodelet"];
 
-/// The most parts of a node; more are of names that many classes share.
+/// The most parts of a node; more are of names that many classes share: the largest node of 182 repositories has 60.
 const MOST_PARTS: usize = 300;
 
 /// The most declarations of one node, and of all nodes together: a hundred times those of the largest robots.
@@ -78,7 +78,8 @@ const MOST_OF_ALL: usize = 500_000;
 /// The most classes that may share a name; a more common name, as `Node`, says nothing outside of its own file.
 const MOST_NAMESAKES: usize = 500;
 
-/// The most programs that launch files may start; like the next limit, it bounds time and memory.
+/// The most programs that launch files may start; like the next limit, it bounds time and memory: ten times those of the largest
+/// workspace seen.
 const MOST_PROGRAMS: usize = 5_000;
 
 /// The most nodes that a workspace may start.
@@ -95,21 +96,12 @@ impl Workspace {
             launches,
             ..Self::default()
         };
-        let relevant = files
-            .into_iter()
-            .filter(|(_, code)| !code.classes.is_empty());
-        for (path, code) in relevant {
-            for (place, class) in code
-                .classes
-                .iter()
-                .enumerate()
-                .filter(|(_, c)| !c.name.is_empty())
-            {
-                let part = (all.files.len(), place);
-                all.by_name
-                    .entry(class.name.clone())
-                    .or_default()
-                    .push(part);
+        let files = files.into_iter();
+        for (path, code) in files.filter(|(_, code)| !code.classes.is_empty()) {
+            let named = code.classes.iter().enumerate();
+            for (place, class) in named.filter(|(_, c)| !c.name.is_empty()) {
+                let parts = all.by_name.entry(class.name.clone()).or_default();
+                parts.push((all.files.len(), place));
             }
             all.files.push(CodeFile {
                 package: package_of(&all.packages, &path),
@@ -123,14 +115,10 @@ impl Workspace {
     /// Every declaration outside tests, with or without a node.
     pub(super) fn places(&self) -> Vec<FileDeclaration> {
         let files = self.files.iter().filter(|file| !is_test(&file.path));
-        let declared = files.flat_map(|file| {
-            let all = file.code.classes.iter().flat_map(|c| &c.declarations);
-            all.map(|declaration| FileDeclaration {
-                path: file.path.clone(),
-                declaration: declaration.clone(),
-            })
-        });
-        declared.collect()
+        let classes = files.flat_map(|file| file.code.classes.iter().map(move |c| (file, c)));
+        classes
+            .flat_map(|(file, class)| declared(file, class))
+            .collect()
     }
 
     /// Every node that may be started, as in the code and as in launch files.
@@ -250,10 +238,7 @@ impl Workspace {
         let all = files
             .iter()
             .flat_map(|f| (0..self.files[*f].code.classes.len()).map(|place| (*f, place)));
-        let names = all.filter(|part| part.1 == 0 || !self.is_node(*part, 0));
-        let names: BTreeSet<String> = names
-            .flat_map(|part| self.class(part).node_names.clone())
-            .collect();
+        let names = self.names(all.filter(|part| part.1 == 0 || !self.is_node(*part, 0)));
         let path = self.files[*files.first()?].path.clone();
         let (parts, _) = self.belonging(free);
         let node = self.node(&parts, names, (path, String::new()));
@@ -263,24 +248,21 @@ impl Workspace {
     fn class_node(&self, part: ClassPlace) -> CodeNode {
         let (parts, _) = self.belonging(self.parts(part));
         // A node name in the class itself takes precedence over those in its bases.
-        let own = self
-            .parts(part)
+        let mut names = self.names(self.parts(part));
+        if names.is_empty() {
+            let of_bases = parts.iter().copied();
+            names = self.names(of_bases.filter(|part| self.is_node(*part, 0)));
+        }
+        let program = (self.file(part).path.clone(), self.class(part).name.clone());
+        self.node(&parts, names, program)
+    }
+
+    /// The names that these parts give to their node.
+    fn names(&self, parts: impl IntoIterator<Item = ClassPlace>) -> BTreeSet<String> {
+        let names = parts
             .into_iter()
-            .flat_map(|p| self.class(p).node_names.clone())
-            .collect::<BTreeSet<_>>();
-        let names = if own.is_empty() {
-            let of_bases = parts.iter().filter(|p| self.is_node(**p, 0));
-            of_bases
-                .flat_map(|p| self.class(*p).node_names.clone())
-                .collect()
-        } else {
-            own
-        };
-        self.node(
-            &parts,
-            names,
-            (self.file(part).path.clone(), self.class(part).name.clone()),
-        )
+            .flat_map(|part| &self.class(part).node_names);
+        names.cloned().collect()
     }
 
     fn node(
@@ -290,22 +272,11 @@ impl Workspace {
         program: (String, String),
     ) -> CodeNode {
         let is_recorder = parts.iter().any(|part| self.class(*part).is_recorder);
-        let placed = |part: &ClassPlace| {
-            let path = &self.file(*part).path;
-            let declared = self.class(*part).declarations.iter().cloned();
-            declared
-                .map(|declaration| FileDeclaration {
-                    path: path.clone(),
-                    declaration,
-                })
-                .collect::<Vec<_>>()
-        };
+        let placed = |part: &ClassPlace| declared(self.file(*part), self.class(*part));
+        // A text that is not a valid node name has another purpose.
+        let is_name = |n: &String| !n.is_empty() && !n.contains(char::is_whitespace);
         CodeNode {
-            // A text that is not a valid node name has another purpose.
-            names: names
-                .into_iter()
-                .filter(|n| !n.is_empty() && !n.contains(char::is_whitespace))
-                .collect(),
+            names: names.into_iter().filter(is_name).collect(),
             program,
             // A recorder subscribes to topics given at run time, which are not in the code.
             declared: if is_recorder {
@@ -354,32 +325,31 @@ impl Workspace {
         };
         if all.len() > MOST_NAMESAKES {
             let from = all.partition_point(|part| part.0 < file);
-            let own = all[from..].iter().take_while(|part| part.0 == file);
+            let mut own = all[from..]
+                .iter()
+                .take_while(|part| part.0 == file)
+                .copied();
             return own
-                .copied()
-                .filter(|p| self.class(*p).is_defined)
-                .take(1)
+                .find(|p| self.class(*p).is_defined)
+                .into_iter()
                 .collect();
         }
         let defined = || all.iter().copied().filter(|p| self.class(*p).is_defined);
         let here = &self.files[file];
-        let import = here
-            .code
-            .imports
-            .get(name)
-            .map(|full| full.rsplit_once('.').map_or("", |(module, _)| module));
-        let module =
-            import.map(|module| format!("{}.py", module.trim_start_matches('.').replace('.', "/")));
+        let import = here.code.imports.get(name);
+        let module = import.map(|full| {
+            let module = full.rsplit_once('.').map_or("", |(module, _)| module);
+            format!("{}.py", module.trim_start_matches('.').replace('.', "/"))
+        });
         let is_imported = |p: &ClassPlace| {
-            module
-                .as_ref()
-                .is_some_and(|m| is_path_end(&self.file(*p).path, m))
+            let module = module.as_ref();
+            module.is_some_and(|m| is_path_end(&self.file(*p).path, m))
         };
         let in_package =
             |p: &ClassPlace| here.package.is_some() && self.file(*p).package == here.package;
-        let in_file = defined().find(|p| p.0 == file);
-        let chosen =
-            in_file.or_else(|| only(defined().filter(|p| is_imported(p) && in_package(p))));
+        let is_both = |p: &ClassPlace| is_imported(p) && in_package(p);
+        let chosen = defined().find(|p| p.0 == file);
+        let chosen = chosen.or_else(|| only(defined().filter(is_both)));
         let chosen = chosen.or_else(|| only(defined().filter(is_imported)));
         let chosen = chosen.or_else(|| only(defined().filter(in_package)));
         let chosen = chosen.or_else(|| only(defined()));
@@ -389,14 +359,11 @@ impl Workspace {
     /// A class with its functions in other files of its package.
     fn parts(&self, part: ClassPlace) -> Vec<ClassPlace> {
         let package = self.file(part).package;
-        let others = self
-            .by_name
-            .get(&self.class(part).name)
-            .into_iter()
-            .flatten();
-        let others =
-            others.filter(|p| !self.class(**p).is_defined && self.file(**p).package == package);
-        std::iter::once(part).chain(others.copied()).collect()
+        let others = self.by_name.get(&self.class(part).name);
+        let others = others.into_iter().flatten().copied();
+        let is_own =
+            |p: &ClassPlace| !self.class(*p).is_defined && self.file(*p).package == package;
+        std::iter::once(part).chain(others.filter(is_own)).collect()
     }
 
     /// Whether a class is a node, by its base classes.
@@ -418,6 +385,17 @@ impl Workspace {
     fn class(&self, part: ClassPlace) -> &Class {
         &self.files[part.0].code.classes[part.1]
     }
+}
+
+/// The declarations of a class in a file.
+fn declared<'a>(
+    file: &'a CodeFile,
+    class: &'a Class,
+) -> impl Iterator<Item = FileDeclaration> + use<'a> {
+    class.declarations.iter().map(|one| FileDeclaration {
+        path: file.path.clone(),
+        declaration: one.clone(),
+    })
 }
 
 /// The only item; `None` for none or several.

@@ -7,13 +7,13 @@
 mod action;
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use crate::base::budget::LaunchWork;
 use crate::base::error::{Error, Result};
-use crate::evidence::given::substitution::LONGEST;
-use crate::evidence::given::tree::Tree;
-use crate::evidence::syntax::{Language, Node, Parsed, children, line};
+use crate::evidence::given::tree::{LONGEST, Tree};
+use crate::evidence::syntax::{Language, Node, Parsed, children, fields, line};
 
 use PythonValue::{Bool, Dict, Function, List, Number, Text, Unknown};
 
@@ -73,7 +73,8 @@ fn word(is_true: bool) -> String {
 
 // Statements.
 
-/// The deepest nesting of expressions and calls that is followed, which the stack must hold.
+/// The deepest nesting of expressions and calls that is followed, which the stack must hold: half a megabyte in a debug build.
+/// Launch files in use nest a dozen deep.
 const NESTED: usize = 120;
 
 /// The cost of one step, in bytes of work: as that of so much text.
@@ -89,6 +90,11 @@ struct Evaluator<'a> {
     nested: usize,
 }
 
+/// The continuation after a statement: the next one, or none.
+type Flow = ControlFlow<()>;
+const NEXT: Flow = ControlFlow::Continue(());
+const DONE: Flow = ControlFlow::Break(());
+
 /// The variables of a function that is being followed.
 #[derive(Default)]
 struct Locals {
@@ -96,13 +102,6 @@ struct Locals {
     returned: Option<PythonValue>,
     /// The value of `undecided` where the function was called.
     undecided: usize,
-}
-
-/// The continuation after a statement.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum ControlFlow {
-    Next,
-    Done,
 }
 
 impl<'a> Evaluator<'a> {
@@ -123,9 +122,9 @@ impl<'a> Evaluator<'a> {
 
     /// The return value of `generate_launch_description`; `None` if there is no such function.
     fn launch_description(&mut self) -> Option<PythonValue> {
-        self.run(self.parsed.root());
+        let _ = self.run(self.parsed.root());
         let function = *self.functions.get("generate_launch_description")?;
-        Some(self.call(function, &[], &[]))
+        Some(self.call(function, &Arguments::default()))
     }
 
     /// The value of the file's only expression; `None` if there is none or it is unknown.
@@ -152,57 +151,52 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    fn run(&mut self, block: Node<'a>) -> ControlFlow {
-        for statement in children(block) {
-            if self.statement(statement) == ControlFlow::Done {
-                return ControlFlow::Done;
-            }
-        }
-        ControlFlow::Next
+    fn run(&mut self, block: Node<'a>) -> Flow {
+        let mut all = children(block).into_iter();
+        all.try_for_each(|statement| self.statement(statement))
     }
 
-    fn statement(&mut self, node: Node<'a>) -> ControlFlow {
+    fn statement(&mut self, node: Node<'a>) -> Flow {
         if self.budget.spend(STEP).is_none() || self.nested > NESTED {
-            return ControlFlow::Done;
+            return DONE;
         }
         self.nested += 1;
         let flow = match node.kind() {
             "expression_statement" => {
-                for expression in children(node) {
-                    self.effect(expression);
+                for one in children(node) {
+                    self.effect(one);
                 }
-                ControlFlow::Next
+                NEXT
             }
             "function_definition" => {
-                if let Some(name) = node.child_by_field_name("name") {
-                    self.functions.insert(self.text(name).to_owned(), node);
-                }
-                ControlFlow::Next
+                let name = self.parsed.field(node, "name");
+                self.functions.insert(name.to_owned(), node);
+                NEXT
             }
             "decorated_definition" => {
                 let definition = node.child_by_field_name("definition");
-                definition.map_or(ControlFlow::Next, |inner| self.statement(inner))
+                definition.map_or(NEXT, |inner| self.statement(inner))
             }
             "return_statement" => self.returns(node),
             "if_statement" => self.branches(node),
             "for_statement" => self.repeats(node),
             "with_statement" | "try_statement" => {
                 let body = node.child_by_field_name("body");
-                body.map_or(ControlFlow::Next, |body| self.run(body))
+                body.map_or(NEXT, |body| self.run(body))
             }
-            _ => ControlFlow::Next,
+            _ => NEXT,
         };
         self.nested -= 1;
         flow
     }
 
-    fn returns(&mut self, node: Node<'a>) -> ControlFlow {
+    fn returns(&mut self, node: Node<'a>) -> Flow {
         let value = node
             .named_child(0)
             .map_or(PythonValue::None, |n| self.value(n));
         let undecided = self.undecided;
         let Some(frame) = self.frames.last_mut() else {
-            return ControlFlow::Done;
+            return DONE;
         };
         let is_sure = undecided == frame.undecided;
         frame.returned = Some(match (frame.returned.take(), value) {
@@ -214,28 +208,18 @@ impl<'a> Evaluator<'a> {
             (Some(before), after) if before.acts() && after.acts() => List(vec![before, after]),
             _ => unknown(node),
         });
-        if is_sure {
-            ControlFlow::Done
-        } else {
-            ControlFlow::Next
-        }
+        if is_sure { DONE } else { NEXT }
     }
 
-    fn branches(&mut self, node: Node<'a>) -> ControlFlow {
+    fn branches(&mut self, node: Node<'a>) -> Flow {
         let mut cursor = node.walk();
-        let others: Vec<Node<'a>> = node
-            .children_by_field_name("alternative", &mut cursor)
-            .collect();
-        let mut sure = true;
-        let mut flow = ControlFlow::Next;
+        let others = node.children_by_field_name("alternative", &mut cursor);
+        let (mut sure, mut flow) = (true, NEXT);
         for part in std::iter::once(node).chain(others) {
-            let truth = match part.child_by_field_name("condition") {
-                Some(condition) => self.value(condition).truth(),
-                None => Some(true),
-            };
-            let body = part
-                .child_by_field_name("consequence")
-                .or(part.child_by_field_name("body"));
+            let field = |name| part.child_by_field_name(name);
+            let condition = field("condition");
+            let truth = condition.map_or(Some(true), |one| self.value(one).truth());
+            let body = field("consequence").or(field("body"));
             let Some(body) = body.filter(|_| truth != Some(false)) else {
                 continue;
             };
@@ -247,21 +231,18 @@ impl<'a> Evaluator<'a> {
                 break;
             }
         }
-        if sure { flow } else { ControlFlow::Next }
+        if sure { flow } else { NEXT }
     }
 
-    fn repeats(&mut self, node: Node<'a>) -> ControlFlow {
-        let fields = ["left", "right", "body"].map(|name| node.child_by_field_name(name));
-        let [Some(left), Some(right), Some(body)] = fields else {
-            return ControlFlow::Next;
+    fn repeats(&mut self, node: Node<'a>) -> Flow {
+        let Some([left, right, body]) = fields(node, ["left", "right", "body"]) else {
+            return NEXT;
         };
         for item in self.items(right) {
             self.assign(left, item);
-            if self.run(body) == ControlFlow::Done {
-                return ControlFlow::Done;
-            }
+            self.run(body)?;
         }
-        ControlFlow::Next
+        NEXT
     }
 
     /// The items of a loop, as far as known.
@@ -297,16 +278,9 @@ impl<'a> Evaluator<'a> {
         match (target.kind(), value) {
             ("identifier", value) => {
                 let name = self.text(target).to_owned();
-                let sure = self
-                    .frames
-                    .last()
-                    .is_some_and(|f| f.undecided == self.undecided);
-                let value = if sure || value.acts() {
-                    value
-                } else {
-                    unknown(target)
-                };
                 if let Some(frame) = self.frames.last_mut() {
+                    let is_sure = frame.undecided == self.undecided || value.acts();
+                    let value = if is_sure { value } else { unknown(target) };
                     frame.names.insert(name, value);
                 }
             }
@@ -373,14 +347,8 @@ impl<'a> Evaluator<'a> {
     }
 
     /// The return value of a function of this file.
-    fn call(
-        &mut self,
-        function: Node<'a>,
-        positional: &[PythonValue],
-        named: &[(String, PythonValue)],
-    ) -> PythonValue {
-        let parts = ["parameters", "body"].map(|name| function.child_by_field_name(name));
-        let [Some(parameters), Some(body)] = parts else {
+    fn call(&mut self, function: Node<'a>, given: &Arguments) -> PythonValue {
+        let Some([parameters, body]) = fields(function, ["parameters", "body"]) else {
             return unknown(function);
         };
         if self.nested > NESTED {
@@ -391,24 +359,21 @@ impl<'a> Evaluator<'a> {
             ..Locals::default()
         };
         for (at, parameter) in children(parameters).into_iter().enumerate() {
-            let name = parameter
-                .child_by_field_name("name")
-                .or(match parameter.kind() {
-                    "identifier" => Some(parameter),
-                    _ => parameter.named_child(0),
-                });
+            let name = parameter.child_by_field_name("name");
+            let name = name.or_else(|| match parameter.kind() {
+                "identifier" => Some(parameter),
+                _ => parameter.named_child(0),
+            });
             let name = name.map_or("", |n| self.text(n)).to_owned();
-            let given = named.iter().find(|(n, _)| *n == name).map(|(_, v)| v);
-            let given = given.or(positional.get(at)).cloned();
+            let given = given.named(&name).or(given.positional.get(at)).cloned();
             let default = parameter.child_by_field_name("value");
             let value = given.or_else(|| default.map(|d| self.value(d)));
-            frame
-                .names
-                .insert(name, value.unwrap_or(unknown(parameter)));
+            let value = value.unwrap_or(unknown(parameter));
+            frame.names.insert(name, value);
         }
         self.frames.push(frame);
         self.nested += 1;
-        self.run(body);
+        let _ = self.run(body);
         self.nested -= 1;
         let frame = self.frames.pop();
         frame.and_then(|f| f.returned).unwrap_or(PythonValue::None)
@@ -474,9 +439,8 @@ impl<'a> Evaluator<'a> {
                 "string_content" => text.push_str(self.text(part)),
                 "string" => text.push_str(&self.string(part).launch_text()),
                 "interpolation" => {
-                    let inner = part
-                        .child_by_field_name("expression")
-                        .or(part.named_child(0));
+                    let inner = part.child_by_field_name("expression");
+                    let inner = inner.or(part.named_child(0));
                     let value = inner.map_or(PythonValue::None, |n| self.value(n));
                     text.push_str(&value.launch_text());
                 }
@@ -500,8 +464,7 @@ impl<'a> Evaluator<'a> {
     fn dictionary(&mut self, node: Node<'a>) -> PythonValue {
         let mut map: Vec<(String, PythonValue)> = Vec::new();
         for pair in children(node) {
-            let parts = ["key", "value"].map(|name| pair.child_by_field_name(name));
-            if let [Some(key), Some(value)] = parts {
+            if let Some([key, value]) = fields(pair, ["key", "value"]) {
                 let (key, value) = (self.value(key), self.value(value));
                 map.push((key.launch_text(), value));
             }
@@ -514,8 +477,8 @@ impl<'a> Evaluator<'a> {
         let [body, clause, ..] = parts[..] else {
             return unknown(node);
         };
-        let sides = ["left", "right"].map(|name| clause.child_by_field_name(name));
-        let ([Some(left), Some(right)], 2) = (sides, parts.len()) else {
+        let sides = fields(clause, ["left", "right"]);
+        let Some([left, right]) = sides.filter(|_| parts.len() == 2) else {
             return unknown(node);
         };
         let mut list = Vec::new();
@@ -527,8 +490,7 @@ impl<'a> Evaluator<'a> {
     }
 
     fn binary(&mut self, node: Node<'a>) -> PythonValue {
-        let fields = ["left", "operator", "right"].map(|name| node.child_by_field_name(name));
-        let [Some(left), Some(operator), Some(right)] = fields else {
+        let Some([left, operator, right]) = fields(node, ["left", "operator", "right"]) else {
             return unknown(node);
         };
         let (left, right) = (self.value(left), self.value(right));
@@ -608,13 +570,10 @@ impl<'a> Evaluator<'a> {
     }
 
     fn both(&mut self, node: Node<'a>) -> Option<bool> {
-        let side = |name| node.child_by_field_name(name);
-        let (left, right) = (
-            self.value(side("left")?).truth(),
-            self.value(side("right")?).truth(),
-        );
+        let [left, operator, right] = fields(node, ["left", "operator", "right"])?;
+        let (left, right) = (self.value(left).truth(), self.value(right).truth());
         // The value of a left side for which the operator short-circuits.
-        let deciding = self.text(side("operator")?) == "or";
+        let deciding = self.text(operator) == "or";
         match (left, right) {
             (Some(a), _) if a == deciding => Some(deciding),
             (_, Some(b)) if b == deciding => Some(deciding),
@@ -666,12 +625,7 @@ impl<'a> Evaluator<'a> {
         let (found, key_value) = (self.value(value), self.value(key));
         let part = match (&found, &key_value) {
             (List(list), Number(at)) => usize::try_from(*at).ok().and_then(|at| list.get(at)),
-            (Dict(map), key) => {
-                let key = key.launch_text();
-                map.iter()
-                    .find(|(name, _)| *name == key)
-                    .map(|(_, value)| value)
-            }
+            (Dict(map), key) => named(map, &key.launch_text()),
             _ => None,
         };
         part.cloned().unwrap_or(unknown(key))
@@ -698,6 +652,12 @@ impl PythonValue {
 
 // Calls.
 
+/// The value of a name in a list of names.
+fn named<'v>(map: &'v [(String, PythonValue)], name: &str) -> Option<&'v PythonValue> {
+    let found = map.iter().find(|(known, _)| known == name);
+    found.map(|(_, value)| value)
+}
+
 /// The arguments of a call, in order and by name.
 #[derive(Default)]
 struct Arguments {
@@ -714,10 +674,7 @@ impl Arguments {
 
     /// The argument of this name.
     fn named(&self, name: &str) -> Option<&PythonValue> {
-        self.named
-            .iter()
-            .find(|(n, _)| n == name)
-            .map(|(_, value)| value)
+        named(&self.named, name)
     }
 
     /// An argument as a text of launch files.
@@ -735,15 +692,10 @@ impl<'a> Evaluator<'a> {
         };
         let arguments = self.arguments(node);
         if function.kind() == "attribute"
-            && let (Some(object), Some(name)) = (
-                function.child_by_field_name("object"),
-                function.child_by_field_name("attribute"),
-            )
+            && let Some([object, name]) = fields(function, ["object", "attribute"])
+            && let Some(value) = self.method(object, self.text(name), &arguments)
         {
-            let name = self.text(name);
-            if let Some(value) = self.method(object, name, &arguments) {
-                return self.kept(value, node);
-            }
+            return self.kept(value, node);
         }
         let full = self.text(function);
         let name = full.rsplit('.').next().unwrap_or(full);
@@ -751,7 +703,7 @@ impl<'a> Evaluator<'a> {
             return self.lookup(argument, node);
         }
         if let Some(own) = self.function(name) {
-            return self.call(own, &arguments.positional, &arguments.named);
+            return self.call(own, &arguments);
         }
         let value = self
             .action(name, &arguments)
@@ -830,31 +782,19 @@ impl<'a> Evaluator<'a> {
                 let text = self.value(object).text()?;
                 formatted(&text, arguments).map(Text)
             }
-            "lower" => self
-                .value(object)
-                .text()
-                .filter(|t| !t.contains("$("))
-                .map(|t| Text(t.to_lowercase())),
+            "lower" => {
+                let text = self.value(object).text()?;
+                (!text.contains("$(")).then(|| Text(text.to_lowercase()))
+            }
             "get" => {
                 if self.text(object) == "os.environ" {
                     return plain("os.getenv", arguments);
                 }
                 match self.value(object) {
                     Dict(map) => {
-                        let key = first()?.launch_text();
-                        let found = map
-                            .into_iter()
-                            .find(|(k, _)| *k == key)
-                            .map(|(_, value)| value);
-                        Some(
-                            found.unwrap_or(
-                                arguments
-                                    .positional
-                                    .get(1)
-                                    .cloned()
-                                    .unwrap_or(PythonValue::None),
-                            ),
-                        )
+                        let found = named(&map, &first()?.launch_text());
+                        let found = found.or(arguments.positional.get(1)).cloned();
+                        Some(found.unwrap_or(PythonValue::None))
                     }
                     _ => None,
                 }
@@ -874,65 +814,67 @@ impl<'a> Evaluator<'a> {
 
     /// The value of an attribute, such as `Path(…).parent`.
     fn attribute(&mut self, node: Node<'a>) -> PythonValue {
-        let unknown = Unknown(line(node));
-        let Some(object) = node.child_by_field_name("object") else {
-            return unknown;
+        let Some([object, name]) = fields(node, ["object", "attribute"]) else {
+            return unknown(node);
         };
-        let name = node
-            .child_by_field_name("attribute")
-            .map_or("", |n| self.text(n));
-        match (name, self.value(object)) {
+        match (self.text(name), self.value(object)) {
             ("parent", Text(path)) => Text(parent(&path).to_owned()),
-            _ => unknown,
+            _ => unknown(node),
         }
     }
 }
 
+/// Launch substitutions: the name in Python, the names of the arguments, and the XML notation with `@` for each argument. Of
+/// several lines of one name the first counts that has all its arguments.
+const SUBSTITUTIONS: &str = "\
+    LaunchConfiguration variable_name default: $(var @ @)
+    LaunchConfiguration variable_name: $(var @)
+    TextSubstitution text: @
+    FindPackageShare package: $(find-pkg-share @)
+    get_package_share_directory package: $(find-pkg-share @)
+    get_package_share_path package: $(find-pkg-share @)
+    FindPackagePrefix package: $(find-pkg-prefix @)
+    FindPackage package: $(find-pkg-prefix @)
+    get_package_prefix package: $(find-pkg-prefix @)
+    ThisLaunchFileDir: $(dirname)
+    EnvironmentVariable name default_value: $(env @ @)
+    EnvironmentVariable name default: $(env @ @)
+    EnvironmentVariable name: $(env @)
+    getenv name default_value: $(env @ @)
+    getenv name default: $(env @ @)
+    getenv name: $(env @)
+    PythonExpression expression: $(eval @)
+    EqualsSubstitution left right: $(eval '@' == '@')
+    NotEqualsSubstitution left right: $(eval '@' != '@')
+    NotSubstitution value: $(not @)
+    AndSubstitution left right: $(and @ @)
+    OrSubstitution left right: $(or @ @)
+    PythonLaunchDescriptionSource launch_file_path: @
+    AnyLaunchDescriptionSource launch_file_path: @
+    XMLLaunchDescriptionSource launch_file_path: @
+    YAMLLaunchDescriptionSource launch_file_path: @
+    FrontendLaunchDescriptionSource launch_file_path: @";
+
 /// A launch substitution in its XML notation.
-fn substitution(name: &str, arguments: &Arguments) -> Option<PythonValue> {
-    let text = |place, name| arguments.text(place, name);
-    let made = match name {
-        "LaunchConfiguration" => match text(1, "default") {
-            Some(default) => format!("$(var {} {default})", text(0, "variable_name")?),
-            None => format!("$(var {})", text(0, "variable_name")?),
-        },
-        "TextSubstitution" => text(0, "text")?,
-        "FindPackageShare" | "get_package_share_directory" | "get_package_share_path" => {
-            format!("$(find-pkg-share {})", text(0, "package")?)
-        }
-        "FindPackagePrefix" | "FindPackage" | "get_package_prefix" => {
-            format!("$(find-pkg-prefix {})", text(0, "package")?)
-        }
-        "ThisLaunchFileDir" => "$(dirname)".to_owned(),
-        "EnvironmentVariable" | "getenv" => {
-            match text(1, "default_value").or_else(|| text(1, "default")) {
-                Some(default) => format!("$(env {} {default})", text(0, "name")?),
-                None => format!("$(env {})", text(0, "name")?),
-            }
-        }
-        "PathJoinSubstitution" | "PathJoin" => match arguments.get(0, "substitutions")? {
+fn substitution(name: &str, given: &Arguments) -> Option<PythonValue> {
+    if let "PathJoinSubstitution" | "PathJoin" = name {
+        return Some(Text(match given.get(0, "substitutions")? {
             List(parts) => path(parts),
             other => other.launch_text(),
-        },
-        "PythonExpression" => format!("$(eval {})", text(0, "expression")?),
-        "EqualsSubstitution" => {
-            format!("$(eval '{}' == '{}')", text(0, "left")?, text(1, "right")?)
+        }));
+    }
+    SUBSTITUTIONS.lines().find_map(|line| {
+        let (words, notation) = line.trim().split_once(": ")?;
+        let mut words = words.split(' ');
+        words.next().filter(|own| *own == name)?;
+        let texts = (0..).zip(words).map(|(at, name)| given.text(at, name));
+        let mut parts = notation.split('@');
+        let mut made = parts.next()?.to_owned();
+        for (text, part) in texts.zip(parts) {
+            made.extend([&text?, part]);
         }
-        "NotEqualsSubstitution" => {
-            format!("$(eval '{}' != '{}')", text(0, "left")?, text(1, "right")?)
-        }
-        "NotSubstitution" => format!("$(not {})", text(0, "value")?),
-        "AndSubstitution" => format!("$(and {} {})", text(0, "left")?, text(1, "right")?),
-        "OrSubstitution" => format!("$(or {} {})", text(0, "left")?, text(1, "right")?),
-        // Their path argument.
-        "PythonLaunchDescriptionSource"
-        | "AnyLaunchDescriptionSource"
-        | "XMLLaunchDescriptionSource"
-        | "YAMLLaunchDescriptionSource"
-        | "FrontendLaunchDescriptionSource" => text(0, "launch_file_path")?,
-        _ => return None,
-    };
-    Some(Text(made))
+        Some(Text(made))
+    })
 }
 
 /// The result of a function of Python itself.
@@ -1036,7 +978,8 @@ enum PythonValue {
     Function(String),
 }
 
-/// The deepest nesting of values that is kept, which the stack must hold.
+/// The deepest nesting of values that is kept, which the stack must hold while they are copied and dropped; below that of trees,
+/// which they become.
 const DEEPEST: usize = 48;
 
 impl PythonValue {
@@ -1102,33 +1045,30 @@ impl PythonValue {
 
     /// The size in bytes, approximately, and the depth of nesting.
     fn measure(&self) -> (usize, usize) {
-        let all = |parts: &mut dyn Iterator<Item = (usize, usize)>| {
-            parts.fold((32, 1), |(size, depth), (s, d)| {
-                (size + s, depth.max(d + 1))
-            })
-        };
         match self {
             Self::Text(text) => (32 + text.len(), 1),
-            Self::List(list) => all(&mut list.iter().map(Self::measure)),
-            Self::Dict(map) => all(&mut map.iter().map(|(key, value)| {
-                let (size, depth) = value.measure();
-                (size + key.len(), depth)
-            })),
+            Self::List(list) => measured(32, list.iter().map(Self::measure)),
+            Self::Dict(map) => {
+                let keys = map.iter().map(|(key, _)| key.len()).sum::<usize>();
+                measured(32 + keys, map.iter().map(|(_, value)| value.measure()))
+            }
             Self::Action(tree) => of_tree(tree),
             _ => (32, 1),
         }
     }
 }
 
+/// The size and the depth of what has this size of its own and these parts.
+fn measured(own: usize, parts: impl Iterator<Item = (usize, usize)>) -> (usize, usize) {
+    parts.fold((own, 1), |(size, depth), (s, d)| {
+        (size + s, depth.max(d + 1))
+    })
+}
+
 fn of_tree(tree: &Tree) -> (usize, usize) {
     let texts = tree.attributes.iter().map(|(a, b)| 48 + a.len() + b.len());
     let own = 96 + texts.sum::<usize>();
-    tree.children
-        .iter()
-        .map(of_tree)
-        .fold((own, 1), |(size, depth), (s, d)| {
-            (size + s, depth.max(d + 1))
-        })
+    measured(own, tree.children.iter().map(of_tree))
 }
 
 /// The value of an argument's text: `true` and `false` become Booleans.

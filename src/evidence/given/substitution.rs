@@ -4,15 +4,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::python;
+use super::tree::LONGEST;
 use crate::base::budget::LaunchWork;
-
-/// The longest text after substitution, in bytes: longer than any path.
-pub(super) const LONGEST: usize = 64 << 10;
 
 /// Replaces the part of an anonymous name that differs from run to run; it occurs in no name.
 pub(crate) const ANONYMOUS: char = '*';
 
-/// The deepest nesting of substitutions; deeper ones are hostile.
+/// The deepest nesting of substitutions; deeper ones are hostile: those in use nest three deep.
 const DEEPEST: usize = 16;
 
 /// The context of a text: the values that its substitutions may refer to.
@@ -52,32 +50,24 @@ impl SubstitutionContext<'_> {
 
     /// The value of one substitution, with the inner ones replaced already.
     fn value(&self, inside: &str) -> Option<String> {
-        let (verb, words) = inside
-            .split_once(char::is_whitespace)
-            .unwrap_or((inside, ""));
+        let split = inside.split_once(char::is_whitespace);
+        let (verb, words) = split.unwrap_or((inside, ""));
         let words = unquoted(words);
         let parts: Vec<&str> = words.split_whitespace().map(unquoted).collect();
         let argument = |name: &str| self.arguments.get(name).cloned();
+        let default = words
+            .split_once(' ')
+            .map(|(_, text)| unquoted(text).to_owned());
         let both = |f: fn(&str, &str) -> bool| match parts[..] {
             [a, b] => Some(truth(f(a, b))),
             _ => None,
         };
         match verb {
             // In ROS 2 a default follows the name.
-            "arg" | "var" => match words.split_once(' ') {
-                Some((name, default)) => argument(name).or(Some(unquoted(default).to_owned())),
-                None => argument(words),
-            },
+            "arg" | "var" => argument(words.split(' ').next()?).or(default),
             "anon" => Some(format!("{words}{ANONYMOUS}")),
-            "optenv" => Some(
-                words
-                    .split_once(' ')
-                    .map_or("", |(_, default)| unquoted(default))
-                    .to_owned(),
-            ),
-            "env" => words
-                .split_once(' ')
-                .map(|(_, default)| unquoted(default).to_owned()),
+            "optenv" => default.or(Some(String::new())),
+            "env" => default,
             "dirname" => Some(".".to_owned()),
             "find" | "find-pkg-share" | "find-pkg-prefix" => Some(package(self.path, words)),
             "eval" => python::evaluate(inside.strip_prefix(verb)?.trim(), self.arguments),
@@ -124,13 +114,11 @@ pub(crate) fn closing(text: &str) -> Option<usize> {
 
 /// The folder of a package, searched for above the file and beside those folders; its name if not found.
 fn package(path: &Path, name: &str) -> String {
-    let above = path.ancestors().skip(1);
-    let found = above
-        .into_iter()
-        .find_map(|folder| match folder.file_name() {
-            Some(own) if own == name => Some(folder.to_owned()),
-            _ => Some(folder.join(name)).filter(|beside| !name.is_empty() && beside.is_dir()),
-        });
+    let found = path.ancestors().skip(1).find_map(|folder| {
+        let is_own = folder.file_name().is_some_and(|own| own == name);
+        let beside = || Some(folder.join(name)).filter(|at| !name.is_empty() && at.is_dir());
+        is_own.then(|| folder.to_owned()).or_else(beside)
+    });
     let absolute = found.and_then(|folder| folder.canonicalize().ok());
     absolute.map_or_else(
         || name.to_owned(),

@@ -27,9 +27,11 @@ impl Tree {
     }
 }
 
-/// The deepest nesting of elements; deeper ones are hostile.
+/// The longest text of an attribute after substitution, in bytes: longer than any path.
+pub(super) const LONGEST: usize = 64 << 10;
+/// The deepest nesting of elements; deeper ones are hostile: those in use nest six deep.
 pub(super) const DEEPEST: usize = 64;
-/// The most attributes of an element, whose parsing takes the square of their number.
+/// The most attributes of an element, whose parsing takes the square of their number: a hundredth of a second for so many.
 const MOST_ATTRIBUTES: usize = 2000;
 const XML_HINT: &str = "a launch file begins with `<launch>`";
 const YAML_HINT: &str = "a launch file begins with `launch:` and a list";

@@ -151,14 +151,18 @@ impl<'a> PayloadCursor<'a> {
         Ok(part)
     }
 
+    /// Skips the bytes before the next number of `size` bytes, in CDR.
+    fn align(&mut self, size: usize) -> PayloadResult<()> {
+        let over = self
+            .origin
+            .map_or(0, |origin| (self.at - origin) % size.max(1));
+        self.bytes(if over == 0 { 0 } else { size - over })
+            .map(drop)
+    }
+
     /// The next `N` bytes, aligned to `N` in CDR, least significant first.
     fn number<const N: usize>(&mut self) -> PayloadResult<[u8; N]> {
-        if let Some(origin) = self.origin {
-            let over = (self.at - origin) % N;
-            if over != 0 {
-                self.bytes(N - over)?;
-            }
-        }
+        self.align(N)?;
         let mut number = [0; N];
         number.copy_from_slice(self.bytes(N)?);
         if self.big_endian {
@@ -215,11 +219,8 @@ impl<'a> PayloadCursor<'a> {
 
     /// The next `count` numbers of `size` bytes each as they are written, aligned in CDR.
     pub(crate) fn numbers(&mut self, count: usize, size: usize) -> PayloadResult<&'a [u8]> {
-        if let Some(origin) = self.origin.filter(|_| count > 0) {
-            let over = (self.at - origin) % size.max(1);
-            if over != 0 {
-                self.bytes(size - over)?;
-            }
+        if count > 0 {
+            self.align(size)?;
         }
         self.bytes(count.saturating_mul(size))
     }

@@ -44,7 +44,8 @@ impl MessageValue {
     }
 }
 
-/// The deepest nesting of messages; deeper ones are hostile.
+/// The deepest nesting of messages; deeper ones are hostile: messages that evidence reads nest four deep, and each level multiplies
+/// the work.
 const DEEPEST: usize = 12;
 
 /// Types that definitions use without defining them.
@@ -223,9 +224,9 @@ pub(crate) struct MessageLayout {
     pub(crate) type_name: &'static str,
     /// The type's md5 sum in ROS 1, used if the definition is missing; empty in ROS 2.
     pub(crate) md5: &'static str,
-    /// The fields of the message and of all messages inside it but [`STANDARD`], as [`outline`] writes them, with `time`
-    /// and `duration` as in ROS 1; empty if the reader looks at the definition itself.
-    pub(crate) fields: &'static [(&'static str, &'static str)],
+    /// The fields of the message as [`outline`] writes them, with `time` and `duration` as in ROS 1; then a line for each
+    /// message inside it but [`STANDARD`], which begins with its name. Empty if the reader looks at the definition itself.
+    pub(crate) fields: &'static str,
 }
 
 /// The confidence to which a connection fits a layout.
@@ -252,10 +253,7 @@ const STANDARD: [(&str, &str); 4] = [
 pub(crate) const LOG: MessageLayout = MessageLayout {
     type_name: "rosgraph_msgs/Log",
     md5: "acffd30cd6b6de30f120938c17c593fb",
-    fields: &[(
-        "",
-        "Header header;byte level;string name;string msg;string file;string function;uint32 line;string[] topics",
-    )],
+    fields: "Header header;byte level;string name;string msg;string file;string function;uint32 line;string[] topics",
 };
 
 /// `rosgraph_msgs/Log` before 2011.
@@ -267,10 +265,7 @@ pub(crate) const OLD_LOG: MessageLayout = MessageLayout {
 /// `rcl_interfaces/msg/Log`.
 pub(crate) const LOG2: MessageLayout = MessageLayout::ros2(
     "rcl_interfaces/Log",
-    &[(
-        "",
-        "time stamp;byte level;string name;string msg;string file;string function;uint32 line",
-    )],
+    "time stamp;byte level;string name;string msg;string file;string function;uint32 line",
 );
 
 /// Log records of ROS 1.
@@ -281,10 +276,7 @@ pub(crate) const LOGS: &[MessageLayout] = &[LOG, OLD_LOG, LOG2];
 
 impl MessageLayout {
     /// The layout of a type of ROS 2, which has no checksum.
-    pub(crate) const fn ros2(
-        type_name: &'static str,
-        fields: &'static [(&'static str, &'static str)],
-    ) -> Self {
+    pub(crate) const fn ros2(type_name: &'static str, fields: &'static str) -> Self {
         Self {
             type_name,
             md5: "",
@@ -328,14 +320,15 @@ impl MessageLayout {
 
     /// The message itself must have the fields; nested messages are compared if the definition contains them.
     fn matches(&self, outline: &[(String, String)]) -> bool {
+        let named = |line: &'static str| line.trim().split_once(": ").unwrap_or(("", line));
         outline.iter().enumerate().all(|(at, (name, fields))| {
             let name = if at == 0 { "" } else { name.as_str() };
             let fields = fields.replace("Time ", "time ");
             let fields = fields.replace("Duration ", "duration ");
-            let all = self.fields.iter().chain(&STANDARD);
+            let all = self.fields.lines().map(named).chain(STANDARD);
             let mut known = all.filter(|(known, _)| *known == name).peekable();
             let is_nested = at != 0;
-            is_nested && known.peek().is_none() || known.any(|(_, known)| *known == fields)
+            is_nested && known.peek().is_none() || known.any(|(_, known)| known == fields)
         })
     }
 }

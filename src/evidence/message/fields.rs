@@ -16,7 +16,7 @@ use crate::evidence::message::definition::{
     Array, Field, Form, MessageFields, messages, without_comment,
 };
 
-/// The deepest nesting of messages; deeper ones are hostile.
+/// The deepest nesting of messages; deeper ones are hostile: those in use nest eight deep.
 const DEEPEST: usize = 16;
 /// The most columns; more are hostile: messages in use have some hundred.
 const MOST_COLUMNS: usize = 2000;

@@ -12,11 +12,9 @@ use std::collections::{BTreeMap, BTreeSet};
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
     type_name: "actionlib_msgs/GoalStatusArray",
     md5: "8b2b82f13216d0a8ea88bd3af735e619",
-    fields: &[
-        ("", "Header header;GoalStatus[] status_list"),
-        ("GoalStatus", "GoalID goal_id;byte status;string text"),
-        ("GoalID", "time stamp;string id"),
-    ],
+    fields: "Header header;GoalStatus[] status_list
+             GoalStatus: GoalID goal_id;byte status;string text
+             GoalID: time stamp;string id",
 };
 
 /// The states of goals that their clients wait for: pending, active, preempting, recalling.

@@ -11,9 +11,9 @@ use std::sync::Arc;
 
 use super::SourceContext;
 use crate::base::csv;
-use crate::base::ids::ById;
+use crate::base::ids::Few;
 use crate::base::name::{last_part, resolved};
-use crate::evidence::inference::{Conclusions, ElementKey};
+use crate::evidence::inference::{Conclusions, ElementKey, verb};
 use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Name, Observation, SourceId};
 
@@ -106,7 +106,7 @@ fn contract(line: usize, row: &[String]) -> Option<Contract> {
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let files = files(known);
     let nodes = known.nodes().clone();
-    let mut publishers: ById<Name, Vec<(Name, Contract)>> = ById::default();
+    let mut publishers: Few<Name, Vec<(Name, Contract)>> = Few::default();
     for contract in Owners::new(known).0 {
         for node in nodes.iter().copied() {
             let name = known.text(node);
@@ -148,15 +148,11 @@ fn publish(source: SourceId, known: &mut Conclusions<'_>, topic: Name, nodes: &[
 }
 
 fn words(known: &Conclusions<'_>, node: Name, contract: &Contract) -> String {
-    let verb = if contract.publishes {
-        "publishes"
-    } else {
-        "subscribes to"
-    };
     format!(
-        "{} is assumed to be the one of package {}, which {verb} {} (contracts.csv line {}: {})",
+        "{} is assumed to be the one of package {}, which {} {} (contracts.csv line {}: {})",
         known.text(node),
         contract.package,
+        verb(contract.publishes),
         contract.topic,
         contract.line,
         contract.reference.trim_start_matches("https://")
@@ -216,8 +212,8 @@ impl Owners {
 }
 
 /// The files that each node logs from.
-fn files(known: &Conclusions<'_>) -> ById<Name, BTreeSet<Arc<str>>> {
-    let mut files: ById<Name, BTreeSet<Arc<str>>> = ById::default();
+fn files(known: &Conclusions<'_>) -> Few<Name, BTreeSet<Arc<str>>> {
+    let mut files: Few<Name, BTreeSet<Arc<str>>> = Few::default();
     for fact in &known.facts.list {
         if let Observation::LogsFrom(logger, file) = fact.observation
             && let Some(node) = known.owner(&known.text(logger))

@@ -48,8 +48,8 @@ pub(crate) fn tf_pair(source: SourceId, known: &mut Conclusions<'_>) {
 // The start time inside an anonymous name: rospy appends its process and the milliseconds since 1970, roscpp the
 // nanoseconds.
 
-/// The longest time from a start in a name to the recording, in nanoseconds; if it is longer, the clock was
-/// not set.
+/// The longest time from a start in a name to the recording, in nanoseconds (30 days); if it is longer, the clock was
+/// not set, or the number is not a time. With less, nodes of a robot that is never shut down would lose their start.
 const LONGEST_NS: i64 = 30 * 86_400_000_000_000;
 
 pub(crate) fn anonymous(source: SourceId, known: &mut Conclusions<'_>) {

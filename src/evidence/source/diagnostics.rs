@@ -12,14 +12,9 @@ use std::collections::BTreeSet;
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
     type_name: "diagnostic_msgs/DiagnosticArray",
     md5: "60810da900de1dd6ddd437c3503511da",
-    fields: &[
-        ("", "Header header;DiagnosticStatus[] status"),
-        (
-            "DiagnosticStatus",
-            "byte level;string name;string message;string hardware_id;KeyValue[] values",
-        ),
-        ("KeyValue", "string key;string value"),
-    ],
+    fields: "Header header;DiagnosticStatus[] status
+             DiagnosticStatus: byte level;string name;string message;string hardware_id;KeyValue[] values
+             KeyValue: string key;string value",
 };
 
 pub(crate) fn read(

@@ -8,7 +8,7 @@ use crate::evidence::observation::Observation;
 
 /// `rmw_dds_common/msg/ParticipantEntitiesInfo`; its identifiers have 24 bytes up to Humble, 16 since.
 pub(crate) const SHAPE: MessageLayout =
-    MessageLayout::ros2("rmw_dds_common/ParticipantEntitiesInfo", &[]);
+    MessageLayout::ros2("rmw_dds_common/ParticipantEntitiesInfo", "");
 
 /// The nodes of a participant: namespace and name.
 type ParticipantNodes<'a> = Vec<(&'a str, &'a str)>;

@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::SourceContext;
-use crate::base::ids::ById;
+use crate::base::ids::Few;
 use crate::base::name::{in_space, plain_type};
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
@@ -16,24 +16,27 @@ use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Confidence, Name, SourceId};
 use crate::evidence::observation::{LoggedText, ShownValue};
 
-/// The fewest different values that are significant: two may agree by chance, and numbers are more often equal than words.
+/// The fewest different values that are significant: two may agree by chance, and numbers are more often equal than words. With
+/// fewer, a text `state: 3` beside a counter would be an echo of it; with more, short recordings of a talker would show none.
 const FEWEST: usize = 3;
 const FEWEST_NUMBERS: usize = 5;
 /// The longest time between a text and the message that it repeats, in nanoseconds: both are recorded within milliseconds
 /// unless the recorder is busy. Counters run through the same numbers, so less is allowed between numbers.
 const NEAR_NS: i64 = 1_000_000_000;
 const NEAR_NUMBERS_NS: i64 = 200_000_000;
-/// The share, in per cent, of the texts of one form that must repeat a message; the others' messages were not recorded.
+/// The share, in per cent, of the texts of one form that must repeat a message; the others' messages were not recorded. With half,
+/// texts about another topic, whose values are sometimes the same, would count.
 const SHARE: usize = 80;
 /// The shortest word that counts, in bytes; shorter ones are in too many texts.
 const SHORTEST: usize = 3;
 /// The longest payload that is searched, in bytes; longer ones contain no text that nodes log.
 const LONGEST: usize = 1024;
-/// The most values of one message that are kept; like the limits below, it bounds the work.
+/// The most values of one message that are kept: messages that nodes log have one or two; like the limits below, it bounds the
+/// work.
 const MOST_VALUES: usize = 4;
-/// The most forms of texts that are examined closely: each is compared with all texts of its node.
+/// The most forms of texts that are examined closely: each is compared with all texts of its node. Real missions have some dozen.
 const MOST_FORMS: usize = 4096;
-/// The most forms of texts that are kept.
+/// The most forms of texts that are kept: four times as many as are examined, since most occur once.
 const MOST_KEPT: usize = 1 << 14;
 /// The most messages that are compared with one text, so that the work grows with the texts alone.
 const MOST_NEAR: usize = 64;
@@ -127,7 +130,7 @@ type LogForm = (Name, String, String, Name);
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let (said, shown) = known.facts.logged.sorted();
     let echoes = echoes(known, &said, &shown);
-    let mut by_node: ById<Name, Vec<&str>> = ById::default();
+    let mut by_node: Few<Name, Vec<&str>> = Few::default();
     for text in &said {
         if let Some(node) = known.owner(&text.logger) {
             by_node.grown(node).push(&text.text);

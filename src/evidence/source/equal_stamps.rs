@@ -35,11 +35,13 @@ const ORDERED: u64 = 95;
 /// The share, in per cent, of the best input's matches above which another input is equally good: a camera's image and its
 /// calibration have the same stamps but for lost messages.
 const AS_GOOD: u64 = 97;
-/// The most streams with one stamp; more are a clock, not a flow.
+/// The most streams with one stamp; more are a clock, not a flow, and the work would be the square of their number.
 const MOST_AT_ONCE: usize = 32;
-/// The unit in which log times are kept, in nanoseconds, modulo 2^32.
+/// The unit in which log times are kept, in nanoseconds, modulo 2^32: fine enough for the order of messages in one process, coarse
+/// enough that they repeat after half a day, not within the longest answer.
 const UNIT_NS: i64 = 10_000;
-/// The longest time in which a node responds, in units (1 s).
+/// The longest time in which a node responds, in units (1 s): the slowest detectors take about half of it. With more, outputs of
+/// which the recorder received the input late, by another path, would count.
 const ANSWER: i32 = 100_000;
 /// Lists whose first element begins with a header.
 const LISTS: [&str; 3] = [

@@ -8,14 +8,9 @@ use crate::evidence::observation::Observation;
 /// `lifecycle_msgs/msg/TransitionEvent`.
 pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2(
     "lifecycle_msgs/TransitionEvent",
-    &[
-        (
-            "",
-            "uint64 timestamp;Transition transition;State start_state;State goal_state",
-        ),
-        ("Transition", "byte id;string label"),
-        ("State", "byte id;string label"),
-    ],
+    "uint64 timestamp;Transition transition;State start_state;State goal_state
+     Transition: byte id;string label
+     State: byte id;string label",
 );
 
 pub(crate) fn read(

@@ -3,7 +3,9 @@
 //! and of roscpp about its connections.
 
 use crate::base::name::resolved;
-use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind, Inference, Validity};
+use crate::evidence::inference::{
+    Conclusions, ElementKey, IncidentKind, Inference, Validity, verb,
+};
 use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Confidence, Observation, SourceId};
 use crate::evidence::source::SourceContext;
@@ -13,36 +15,32 @@ pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
     if record.logger.is_empty() || ["recorder.cpp", "player.cpp"].contains(&record.file_name()) {
         return;
     }
-    if let Some((begins, topic)) = bridged(record.text) {
-        let (node, of) = (context.name(&record.logger), context.name(topic));
-        let observation = if begins {
-            Observation::SaysSubscribe(node, of)
-        } else {
-            Observation::Unsubscribe(node, of)
-        };
-        context.states(observation, String::new);
-    } else if let Some((publishes, topic)) = named(record.text) {
-        let (node, of) = (context.name(&record.logger), context.name(topic));
+    let (bridged, named) = (bridged(record.text), named(record.text));
+    let Some((_, topic)) = bridged.or(named) else {
+        return;
+    };
+    let (node, of) = (context.name(&record.logger), context.name(topic));
+    let observation = match (bridged, named) {
+        (Some((false, _)), _) => Observation::Unsubscribe(node, of),
+        (None, Some((true, _))) => Observation::SaysPublish(node, of),
+        _ => Observation::SaysSubscribe(node, of),
+    };
+    context.states(observation, String::new);
+    if let (None, Some((publishes, _))) = (bridged, named)
+        && record.text.contains("incompatible QoS")
+    {
+        let policy = record.text.split_once("incompatible policy: ");
+        let policy = policy.map_or("", |(_, rest)| rest.trim_end_matches(['.', ' ']));
+        let policy = policy.trim_end_matches("_QOS_POLICY").to_lowercase();
+        let policy = context.name(&policy);
         let observation = if publishes {
-            Observation::SaysPublish(node, of)
+            Observation::Starves(node, of, policy)
         } else {
-            Observation::SaysSubscribe(node, of)
+            Observation::Starved(node, of, policy)
         };
-        context.states(observation, String::new);
-        if record.text.contains("incompatible QoS") {
-            let policy = record.text.split_once("incompatible policy: ");
-            let policy = policy.map_or("", |(_, rest)| rest.trim_end_matches(['.', ' ']));
-            let policy = policy.trim_end_matches("_QOS_POLICY").to_lowercase();
-            let policy = context.name(&policy);
-            let observation = if publishes {
-                Observation::Starves(node, of, policy)
-            } else {
-                Observation::Starved(node, of, policy)
-            };
-            context.states(observation, || {
-                format!("{} logs: {}", record.logger, record.text)
-            });
-        }
+        context.states(observation, || {
+            format!("{} logs: {}", record.logger, record.text)
+        });
     }
 }
 
@@ -126,11 +124,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         let Some(topic) = known.facts.known(&full).filter(|t| known.is_recorded(*t)) else {
             continue;
         };
-        let what = if publishes {
-            ElementKey::Publish(node, topic)
-        } else {
-            ElementKey::Subscribe(topic, node)
-        };
+        let what = ElementKey::edge(publishes, node, topic);
         if known.denies(what) {
             continue;
         }
@@ -144,13 +138,9 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         let first = signs.first().copied();
         let when = Validity::Signs { signs, ends };
         let inference = Inference::new(source, what, Confidence::Stated, when);
-        let verb = if publishes {
-            "publishes"
-        } else {
-            "subscribes to"
-        };
         known.because(inference, first, |known| {
-            format!("{} logs that it {verb} {full}", known.text(logger))
+            let (logger, does) = (known.text(logger), verb(publishes));
+            format!("{logger} logs that it {does} {full}")
         });
     }
 }
@@ -255,35 +245,22 @@ enum How {
 fn link(text: &str) -> Option<LoggedSubscription<'_>> {
     let between = |from: &str, to: &str| Some(text.split_once(from)?.1.split_once(to)?.0);
     let caller = || between("callerid=[", "]");
-    let own = |topic| LoggedSubscription {
-        node: None,
-        topic,
-        how: How::Lasts,
-    };
-    let clients = |node, topic, how| LoggedSubscription {
-        node: Some(node),
-        topic,
-        how,
-    };
-    if text.starts_with("Connection: Creating TransportSubscriberLink for topic [") {
-        let topic = between("for topic [", "]")?;
-        return Some(clients(caller()?, topic, How::Begins));
-    }
-    if text.starts_with("Connection to subscriber [callerid=[") && text.contains("dropped") {
-        let topic = between("to topic [", "]")?;
-        return Some(clients(caller()?, topic, How::Ends));
-    }
-    if text.starts_with("Client [") && text.contains("to have datatype/md5sum") {
+    let begins = |start: &str| text.starts_with(start);
+    let (node, topic, how) = if begins("Connection: Creating TransportSubscriberLink for topic [") {
+        (Some(caller()?), between("for topic [", "]")?, How::Begins)
+    } else if begins("Connection to subscriber [callerid=[") && text.contains("dropped") {
+        (Some(caller()?), between("to topic [", "]")?, How::Ends)
+    } else if begins("Client [") && text.contains("to have datatype/md5sum") {
         let topic = between("] wants topic ", " to have datatype")?;
-        return Some(clients(between("Client [", "]")?, topic, How::Refused));
-    }
-    if text.starts_with("Connection to publisher [") && text.contains("dropped") {
-        return Some(own(between("to topic [", "]")?));
-    }
-    if text.starts_with("Retrying connection to [") {
-        return Some(own(between("for topic [", "]")?));
-    }
-    None
+        (Some(between("Client [", "]")?), topic, How::Refused)
+    } else if begins("Connection to publisher [") && text.contains("dropped") {
+        (None, between("to topic [", "]")?, How::Lasts)
+    } else if begins("Retrying connection to [") {
+        (None, between("for topic [", "]")?, How::Lasts)
+    } else {
+        return None;
+    };
+    Some(LoggedSubscription { node, topic, how })
 }
 
 #[cfg(test)]

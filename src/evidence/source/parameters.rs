@@ -10,18 +10,11 @@ use crate::evidence::source::SourceContext;
 /// `rcl_interfaces/msg/ParameterEvent`.
 pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2(
     "rcl_interfaces/ParameterEvent",
-    &[
-        (
-            "",
-            "time stamp;string node;Parameter[] new_parameters;Parameter[] changed_parameters;Parameter[] deleted_parameters",
-        ),
-        ("Parameter", "string name;ParameterValue value"),
-        (
-            "ParameterValue",
-            "byte type;byte bool_value;int64 integer_value;float64 double_value;string string_value;byte[] byte_array_value;\
-             byte[] bool_array_value;int64[] integer_array_value;float64[] double_array_value;string[] string_array_value",
-        ),
-    ],
+    "time stamp;string node;Parameter[] new_parameters;Parameter[] changed_parameters;Parameter[] deleted_parameters
+     Parameter: string name;ParameterValue value
+     ParameterValue: byte type;byte bool_value;int64 integer_value;float64 double_value;string string_value;\
+     byte[] byte_array_value;byte[] bool_array_value;int64[] integer_array_value;float64[] double_array_value;\
+     string[] string_array_value",
 );
 
 /// A parameter that was declared or set.
@@ -120,12 +113,12 @@ pub(crate) fn read_overrides(context: &mut SourceContext<'_>, event: &ParameterE
     let ends: BTreeSet<_> = event.set.iter().filter_map(|p| end_of(p.name)).collect();
     for (topic, publishes) in ends {
         let (node, of) = (context.name(event.node), context.name(topic));
-        let (word, observation) = if publishes {
-            ("publisher", Observation::Publish(node, of))
+        let word = if publishes {
+            "publisher"
         } else {
-            ("subscription", Observation::Subscribe(node, of))
+            "subscription"
         };
-        context.states(observation, || {
+        context.states(Observation::edge(publishes, node, of), || {
             format!("{} declares qos_overrides.{topic}.{word}", event.node)
         });
     }

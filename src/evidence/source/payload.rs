@@ -29,7 +29,8 @@ const SHARE: u64 = 90;
 /// The least ratio of the number of times that the input comes first to that of the output: the recorder receives some
 /// copies before their originals, but not most of them.
 const FIRST: u64 = 3;
-/// The most flows that have a content at once; with more it is a constant.
+/// The most flows that have a content at once; with more it is a constant, such as an empty array, and the work would be the square
+/// of their number.
 const MOST_AT_ONCE: usize = 32;
 /// The most runs of a flow that are kept: a mux that switches more often forwards several inputs at once.
 const MOST_RUNS: usize = 4096;
@@ -101,7 +102,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         }
         known.copies.insert((node, basis));
         let inputs = nearest(&matches, output, &inputs);
-        turns(source, known, &flows, &matches, (output, &inputs));
+        switches(source, known, &flows, &matches, (output, &inputs));
         for input in inputs {
             let topic = flows[input].0;
             let what = ElementKey::Subscribe(topic, node);
@@ -117,7 +118,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
 }
 
 /// Adds the times at which a mux switches to another of its inputs.
-fn turns(
+fn switches(
     source: SourceId,
     known: &mut Conclusions<'_>,
     flows: &[PayloadFlow],
@@ -134,7 +135,7 @@ fn turns(
     {
         let [from, to] = [pair[0], pair[1]].map(|run| flows[run.input].0);
         let what = ElementKey::Topic(flows[output].0);
-        known.incident(source, what, IncidentKind::Turn(from, to), pair[1].first);
+        known.incident(source, what, IncidentKind::Switch(from, to), pair[1].first);
     }
 }
 
@@ -376,8 +377,8 @@ fn select(
         return;
     }
     for pair in inputs.windows(2).filter(|pair| pair[0].1 != pair[1].1) {
-        let turn = IncidentKind::Turn(pair[0].1, pair[1].1);
-        known.incident(source, what, turn, pair[1].0);
+        let switch = IncidentKind::Switch(pair[0].1, pair[1].1);
+        known.incident(source, what, switch, pair[1].0);
     }
 }
 

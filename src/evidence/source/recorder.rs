@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::base::ids::ById;
+use crate::base::ids::Few;
 use crate::base::name::is_recorder;
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind, Inference, Validity};
@@ -60,16 +60,8 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
 /// `rosbag2_interfaces/msg/MessagesLostEvent`.
 pub(crate) const LOST: MessageLayout = MessageLayout::ros2(
     "rosbag2_interfaces/MessagesLostEvent",
-    &[
-        (
-            "",
-            "string node_name;MessagesLostEventTopicStat[] messages_lost_statistics",
-        ),
-        (
-            "MessagesLostEventTopicStat",
-            "string topic_name;uint64 messages_lost_in_transport;uint64 messages_lost_in_recorder",
-        ),
-    ],
+    "string node_name;MessagesLostEventTopicStat[] messages_lost_statistics
+     MessagesLostEventTopicStat: string topic_name;uint64 messages_lost_in_transport;uint64 messages_lost_in_recorder",
 );
 
 pub(crate) fn read_lost(
@@ -94,7 +86,7 @@ pub(crate) fn read_lost(
 
 /// Adds the losses; consecutive reports are combined.
 pub(crate) fn conclude_lost(source: SourceId, known: &mut Conclusions<'_>) {
-    let mut lost: ById<Name, Vec<(Stamp, u64)>> = ById::default();
+    let mut lost: Few<Name, Vec<(Stamp, u64)>> = Few::default();
     for fact in known.facts.list.clone() {
         if let Observation::Lost(topic, many) = fact.observation
             && known.is_recorded(topic)

@@ -8,20 +8,20 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 
 use super::SourceContext;
-use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
+use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind, verb};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::dynamic::MessageLayout;
 use crate::evidence::message::dynamic::{MessageSchema, MessageValue};
 use crate::evidence::observation::{Name, Observation, SourceId};
 
 /// `rosgraph_msgs/msg/Graph`.
-pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2("rosgraph_msgs/Graph", &[]);
+pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2("rosgraph_msgs/Graph", "");
 
 /// `rosgraph_monitor_msgs/msg/Graph`.
-pub(crate) const OLD_SHAPE: MessageLayout = MessageLayout::ros2("rosgraph_monitor_msgs/Graph", &[]);
+pub(crate) const OLD_SHAPE: MessageLayout = MessageLayout::ros2("rosgraph_monitor_msgs/Graph", "");
 
 /// `rosgraph_msgs/msg/Node`.
-pub(crate) const NODE_SHAPE: MessageLayout = MessageLayout::ros2("rosgraph_msgs/Node", &[]);
+pub(crate) const NODE_SHAPE: MessageLayout = MessageLayout::ros2("rosgraph_msgs/Node", "");
 
 /// The definition of a graph in the core interfaces, whose types are those of the other forms unless they differ:
 /// <https://github.com/ros2/rcl_interfaces/tree/rolling/rosgraph_msgs/msg>.
@@ -126,17 +126,13 @@ fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
         }
         for (is_sent, topic, kind, qos) in ends(node) {
             let (of, kind) = (context.name(&topic), context.name(kind));
-            let (observation, verb) = if is_sent {
-                (Observation::Publish(id, of), "publishes")
-            } else {
-                (Observation::Subscribe(id, of), "subscribes to")
-            };
+            let observation = Observation::edge(is_sent, id, of);
             let quality = qos.and_then(quality);
             context.states_in(group, observation, || {
                 let quality = quality
                     .as_ref()
                     .map_or_else(String::new, |q| format!(" ({q})"));
-                format!("{name} {verb} {topic}{quality}")
+                format!("{name} {} {topic}{quality}", verb(is_sent))
             });
             if let Some(quality) = quality.filter(|_| is_sent) {
                 let offered = Observation::Quality(of, context.name(&quality));

@@ -9,7 +9,7 @@ use crate::evidence::message::dynamic::MessageLayout;
 use crate::evidence::observation::{Confidence, Observation};
 
 /// `<service type>_Event`: it begins with `service_msgs/msg/ServiceEventInfo`, with any fields after it.
-pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2("*_Event", &[]);
+pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2("*_Event", "");
 
 pub(crate) fn read(
     context: &mut SourceContext<'_>,

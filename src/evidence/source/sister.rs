@@ -4,13 +4,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::ids::ById;
+use crate::base::ids::Few;
 use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::observation::{Name, SourceId};
 
 /// The fewest topics of their namespace that twins publish: one alone may be chance.
 const FEWEST: usize = 2;
-/// The most twins that are compared one by one, since the work is the square of it.
+/// The most twins that are compared one by one, since the work is the square of it: larger than any fleet in one recording.
 const MOST: usize = 200;
 
 /// A node with its namespace, and the topics it publishes inside it.
@@ -38,7 +38,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
 
 /// The nodes that share their last part, each with its namespace and publications.
 fn families(known: &Conclusions<'_>) -> BTreeMap<String, Vec<Twin>> {
-    let mut published: ById<Name, Vec<Name>> = ById::default();
+    let mut published: Few<Name, Vec<Name>> = Few::default();
     for (node, topic) in known.publications() {
         published.grown(node).push(topic);
     }

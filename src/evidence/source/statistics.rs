@@ -15,12 +15,9 @@ use crate::evidence::source::SourceContext;
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
     type_name: "rosgraph_msgs/TopicStatistics",
     md5: "10152ed868c5097a5e2e4a89d7daa710",
-    fields: &[(
-        "",
-        "string topic;string node_pub;string node_sub;time window_start;time window_stop;int32 delivered_msgs;\
-         int32 dropped_msgs;int32 traffic;duration period_mean;duration period_stddev;duration period_max;\
-         duration stamp_age_mean;duration stamp_age_stddev;duration stamp_age_max",
-    )],
+    fields: "string topic;string node_pub;string node_sub;time window_start;time window_stop;int32 delivered_msgs;\
+             int32 dropped_msgs;int32 traffic;duration period_mean;duration period_stddev;duration period_max;\
+             duration stamp_age_mean;duration stamp_age_stddev;duration stamp_age_max",
 };
 
 pub(crate) fn read(
@@ -58,14 +55,11 @@ pub(crate) fn read(
         // Messages without a header have no age.
         age_ns: Some(age).filter(|_| oldest != 0),
     });
-    if !publisher.is_empty() {
-        let node = context.name(publisher);
-        context.observation(Observation::Publish(node, of), Confidence::Measured, words);
-    }
-    if !subscriber.is_empty() {
-        let node = context.name(subscriber);
-        let stated = Observation::Subscribe(node, of);
-        context.observation(stated, Confidence::Measured, words);
+    for (publishes, node) in [(true, from), (false, to)] {
+        if let Some(node) = node {
+            let stated = Observation::edge(publishes, node, of);
+            context.observation(stated, Confidence::Measured, words);
+        }
     }
     Ok(())
 }
@@ -76,14 +70,9 @@ pub(crate) fn read(
 /// `rosgraph_monitor_msgs/msg/TopicStatistics`.
 pub(crate) const MONITOR: MessageLayout = MessageLayout::ros2(
     "rosgraph_monitor_msgs/TopicStatistics",
-    &[
-        ("", "time timestamp;TopicStatistic[] statistics"),
-        (
-            "TopicStatistic",
-            "byte statistic_type;string node_name;string topic_name;int32 window_count;duration mean;duration min;\
-             duration max",
-        ),
-    ],
+    "time timestamp;TopicStatistic[] statistics
+     TopicStatistic: byte statistic_type;string node_name;string topic_name;int32 window_count;duration mean;\
+     duration min;duration max",
 );
 
 /// The kinds of statistics: the period of a publisher, that of a subscriber, and the time from publishing to taking.
@@ -111,11 +100,7 @@ pub(crate) fn read_monitor(
     for (kind, node, topic, count, mean) in all {
         let (name, of) = (context.name(node), context.name(topic));
         let is_sent = kind == PUBLISHED_PERIOD;
-        let (verb, observation) = if is_sent {
-            ("publishes", Observation::Publish(name, of))
-        } else {
-            ("receives", Observation::Subscribe(name, of))
-        };
+        let verb = if is_sent { "publishes" } else { "receives" };
         let numbers = ends.entry((of, name, is_sent)).or_default();
         let measured = (u64::try_from(count).unwrap_or(0), mean);
         match kind {
@@ -129,7 +114,7 @@ pub(crate) fn read_monitor(
         } else {
             Confidence::Stated
         };
-        context.observation(observation, confidence, || {
+        context.observation(Observation::edge(is_sent, name, of), confidence, || {
             format!("{node} {verb} {topic}: {count} messages counted")
         });
     }
@@ -162,14 +147,9 @@ pub(crate) fn read_monitor(
 /// `statistics_msgs/msg/MetricsMessage`.
 pub(crate) const METRICS: MessageLayout = MessageLayout::ros2(
     "statistics_msgs/MetricsMessage",
-    &[
-        (
-            "",
-            "string measurement_source_name;string metrics_source;string unit;time window_start;time window_stop;\
-             StatisticDataPoint[] statistics",
-        ),
-        ("StatisticDataPoint", "byte data_type;float64 data"),
-    ],
+    "string measurement_source_name;string metrics_source;string unit;time window_start;time window_stop;\
+     StatisticDataPoint[] statistics
+     StatisticDataPoint: byte data_type;float64 data",
 );
 
 /// Kinds of numbers in `statistics_msgs/msg/StatisticDataType`.

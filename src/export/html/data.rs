@@ -20,7 +20,7 @@ use crate::draw::timeline::rows::{Level, Row};
 use crate::evidence::Evidence;
 use crate::graph::{Element, Elements, Id as _};
 use crate::mission::event_log::Kind;
-use crate::mission::events::sentence;
+use crate::mission::event_log::sentence;
 use crate::mission::info::is_ros1;
 use crate::mission::{EventId, Mission};
 use crate::view::{Arrow, ArrowKind, Frame, Item};

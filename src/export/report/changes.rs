@@ -6,7 +6,7 @@ use crate::base::words;
 use crate::graph::{Element, Elements};
 use crate::mission::Mission;
 use crate::mission::event_log::Kind;
-use crate::mission::events::sentence_with;
+use crate::mission::event_log::sentence_with;
 use crate::view::{Frame, Headline, View};
 
 /// The most names listed per kind.

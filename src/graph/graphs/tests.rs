@@ -119,12 +119,12 @@ proptest! {
                 now.insert(what, row);
             });
             let states = now.iter().filter_map(|(what, row): (&Element, &Option<Row>)| {
-                row.as_ref().map(|row| row.state(*what, *span, &all.lifecycles))
+                row.as_ref().map(|row| row.state(*what, *span, all.lifecycle(row)))
             });
             prop_assert_eq!(states.collect::<Vec<_>>(), put.states.clone());
         }
         let topic = Element::Topic(TopicId(1));
-        let of_topic: Vec<_> = all.rows(topic).map(|(at, row)| row.state(topic, graphs[at].0, &[])).collect();
+        let of_topic: Vec<_> = all.rows(topic).map(|(at, row)| row.state(topic, graphs[at].0, None)).collect();
         let put = graphs.iter().filter_map(|(_, g)| g.get(topic));
         prop_assert_eq!(of_topic, put.cloned().collect::<Vec<_>>());
     }

@@ -2,9 +2,10 @@
 //! both. For example, `/nav` logs from 3 s to 90 s and sends `/plan` at 1 Hz until 90 s of 300 s: `/nav` exists until 90 s,
 //! `/nav` publishes `/plan` for as long, and `/plan` exists as long as one of its ends does.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
+use crate::base::ids::Few;
 use crate::base::rhythm::{
     ADVERTISED_NS, BREAK, BREAK_NS, DISCOVERY_NS, FEWEST, FOUND_NS, GONE_NS, REGISTRATION_NS,
     SHUTDOWN_NS, UNUSUAL,
@@ -13,99 +14,107 @@ use crate::base::time::{Span, Stamp};
 use crate::evidence::inference::ElementKey;
 use crate::evidence::observation::Name;
 use crate::evidence::{Confidence, Evidence};
-use crate::graph::ById;
 use crate::graph::history::restarts::{Restart, Restarts};
-use crate::graph::history::tracks::Tracks;
 use crate::graph::history::{Bound, Stretch, hide};
+
+/// The signs and lifetimes of every element.
+///
+/// Boxed, since the tree reserves much unused memory.
+pub(crate) type LivenessOf = BTreeMap<ElementKey, Box<Liveness>>;
+
+/// The elements that exist as long as others, each with its other.
+pub(crate) type Likes = Vec<(ElementKey, ElementKey)>;
 
 /// No edge has a smaller key: nodes and topics come before.
 const FIRST_EDGE: ElementKey = ElementKey::Publish(Name(0), Name(0));
 
 /// Computes all lifetimes; `mission` contains the first and last moments.
 pub(crate) fn compute_lifetimes(
-    tracks: &mut Tracks,
+    liveness_of: &mut LivenessOf,
     likes: &[(ElementKey, ElementKey)],
     restarts: &Restarts,
     mission: (Stamp, Stamp),
 ) {
-    let mut closed: ById<Name, Option<Option<Stamp>>> = ById::default();
+    let mut closed: BTreeMap<Name, Option<Stamp>> = BTreeMap::new();
     // An edge that exists as long as its node is evidence for its topic, but not for the node.
     let of_nodes = likes
         .iter()
         .filter(|(_, other)| matches!(other, ElementKey::Node(_)));
     let followers: BTreeSet<ElementKey> = of_nodes.map(|(what, _)| *what).collect();
-    let mut edges = tracks.split_off(&FIRST_EDGE);
+    let mut edges = liveness_of.split_off(&FIRST_EDGE);
     // A recorder subscribes to topics because they exist, so its subscriptions do not show how long they do.
-    let nodes = tracks.iter().filter_map(|(what, track)| match what {
-        ElementKey::Node(node) if track.evidence.has("recorder") => Some(*node),
-        _ => None,
-    });
+    let nodes = liveness_of
+        .iter()
+        .filter_map(|(what, liveness)| match what {
+            ElementKey::Node(node) if liveness.evidence.has("recorder") => Some(*node),
+            _ => None,
+        });
     let recorders: BTreeSet<Name> = nodes.collect();
     let is_recorded = |what: &ElementKey| matches!(what, ElementKey::Subscribe(_, node) if recorders.contains(node));
-    for (what, track) in &edges {
+    for (what, liveness) in &edges {
         let [Some(node), Some(topic)] = what.ends() else {
             continue;
         };
-        let last = closed.grown(node).get_or_insert(Some(Stamp::MIN));
-        *last = last.and_then(|last| track.closed(last));
-        let learner = tracks.entry(ElementKey::Node(node)).or_default();
+        let last = closed.entry(node).or_insert(Some(Stamp::MIN));
+        *last = last.and_then(|last| liveness.closed(last));
+        let learner = liveness_of.entry(ElementKey::Node(node)).or_default();
         if followers.contains(what)
-            && track.signs.is_empty()
-            && track.confidence > Confidence::Stated
+            && liveness.signs.is_empty()
+            && liveness.confidence > Confidence::Stated
         {
-            learner.evidence = learner.evidence.and(track.evidence);
+            learner.evidence = learner.evidence.and(liveness.evidence);
         } else {
-            learner.learn(track);
+            learner.learn(liveness);
         }
-        let known = tracks.entry(ElementKey::Topic(topic)).or_default();
-        known.know(track, is_recorded(what));
+        let known = liveness_of.entry(ElementKey::Topic(topic)).or_default();
+        known.know(liveness, is_recorded(what));
     }
     // A node ended if its last connection was closed and it has no later sign.
-    for (node, end) in closed.somes() {
+    for (node, end) in closed {
         let end = end.filter(|end| *end > Stamp::MIN);
-        if let (Some(end), Some(track)) = (end, tracks.get_mut(&ElementKey::Node(node)))
-            && track.signs.iter().all(|sign| *sign <= end)
+        if let (Some(end), Some(liveness)) = (end, liveness_of.get_mut(&ElementKey::Node(node)))
+            && liveness.signs.iter().all(|sign| *sign <= end)
         {
-            track.ends.push(end);
+            liveness.ends.push(end);
         }
     }
-    for (what, track) in tracks.iter_mut() {
+    for (what, liveness) in liveness_of.iter_mut() {
         if let ElementKey::Node(node) = what {
-            track.live(mission, true);
+            liveness.live(mission, true);
             for restart in restarts.of(*node) {
-                track.restart(restart);
+                liveness.restart(restart);
             }
         }
     }
-    let mut of_topics: ById<Name, Vec<Lifetime>> = ById::default();
-    let mut of_recorders: ById<Name, Vec<Lifetime>> = ById::default();
+    let mut of_topics: Few<Name, Vec<Lifetime>> = Few::default();
+    let mut of_recorders: Few<Name, Vec<Lifetime>> = Few::default();
     let mut recorded: Vec<ElementKey> = Vec::new();
-    for (what, track) in &mut edges {
+    for (what, liveness) in &mut edges {
         let [Some(node), Some(topic)] = what.ends() else {
             continue;
         };
-        let around = tracks.get(&ElementKey::Node(node));
-        track.live_within(&around.map(|t| Rc::clone(&t.lives)).unwrap_or_default());
+        let around = liveness_of.get(&ElementKey::Node(node));
+        liveness.live_within(&around.map(|t| Rc::clone(&t.lives)).unwrap_or_default());
         if is_recorded(what) {
-            add_lives(of_recorders.grown(topic), &track.lives);
+            add_lives(of_recorders.grown(topic), &liveness.lives);
             recorded.push(*what);
         } else {
-            add_lives(of_topics.grown(topic), &track.lives);
+            add_lives(of_topics.grown(topic), &liveness.lives);
         }
     }
-    tracks.append(&mut edges);
-    live_like(tracks, likes, false, |what, lives| {
+    liveness_of.append(&mut edges);
+    live_like(liveness_of, likes, false, |what, lives| {
         if let [_, Some(topic)] = what.ends() {
             add_lives(of_topics.grown(topic), lives);
         }
     });
-    for (what, track) in tracks.iter_mut() {
+    for (what, liveness) in liveness_of.iter_mut() {
         if let ElementKey::Topic(topic) = what {
             let edges = std::mem::take(of_topics.grown(*topic));
-            track.live(mission, false);
-            track.live_with(edges);
-            if track.lives.is_empty() {
-                track.live_with(std::mem::take(of_recorders.grown(*topic)));
+            liveness.live(mission, false);
+            liveness.live_with(edges);
+            if liveness.lives.is_empty() {
+                liveness.live_with(std::mem::take(of_recorders.grown(*topic)));
             }
         }
     }
@@ -113,13 +122,13 @@ pub(crate) fn compute_lifetimes(
         let [_, Some(topic)] = what.ends() else {
             continue;
         };
-        let around = tracks.get(&ElementKey::Topic(topic));
+        let around = liveness_of.get(&ElementKey::Topic(topic));
         let around = around.map(|t| Rc::clone(&t.lives)).unwrap_or_default();
-        if let Some(track) = tracks.get_mut(&what) {
-            track.stay_within(&around);
+        if let Some(liveness) = liveness_of.get_mut(&what) {
+            liveness.stay_within(&around);
         }
     }
-    live_like(tracks, likes, true, |_, _| {});
+    live_like(liveness_of, likes, true, |_, _| {});
 }
 
 /// Adds the lifetimes of an edge to those of its topic's edges, very many of which may be equal.
@@ -133,22 +142,22 @@ fn add_lives(all: &mut Vec<Lifetime>, lives: &[Lifetime]) {
 
 /// Gives elements the lifetimes of others, either topics or not; those with signs of their own, the beginnings.
 fn live_like(
-    tracks: &mut Tracks,
+    liveness_of: &mut LivenessOf,
     likes: &[(ElementKey, ElementKey)],
     topics: bool,
     mut given: impl FnMut(ElementKey, &[Lifetime]),
 ) {
     for (what, other) in likes {
         if matches!(other, ElementKey::Topic(_)) == topics
-            && let Some(lives) = tracks.get(other).map(|t| Rc::clone(&t.lives))
-            && let Some(track) = tracks.get_mut(what)
+            && let Some(lives) = liveness_of.get(other).map(|t| Rc::clone(&t.lives))
+            && let Some(liveness) = liveness_of.get_mut(what)
         {
-            if track.signs.is_empty() {
-                track.lives = lives;
-            } else if !track.begin_with(&lives) {
+            if liveness.signs.is_empty() {
+                liveness.lives = lives;
+            } else if !liveness.begin_with(&lives) {
                 continue;
             }
-            given(*what, &track.lives);
+            given(*what, &liveness.lives);
         }
     }
 }
@@ -196,14 +205,15 @@ impl Lifetime {
         (self.to, self.ended) = (to.max(self.from), ended);
     }
 
-    fn at(sign: Stamp) -> Self {
+    /// One of a single sign, which began after `gone`.
+    fn at(sign: Stamp, gone: Stamp) -> Self {
         Self {
             from: sign,
             to: sign,
             sign,
             began: Some(Bound {
                 time: sign,
-                earliest: Stamp::MIN,
+                earliest: gone,
                 latest: sign,
             }),
             ended: None,
@@ -289,14 +299,7 @@ fn lives(signs: &[Stamp], ends: &[Stamp]) -> Vec<Lifetime> {
         }
         match lives.last_mut() {
             Some(life) if open => life.end_at(*sign, None),
-            _ => {
-                let mut life = Lifetime::at(*sign);
-                life.began = life.began.map(|b| Bound {
-                    earliest: gone,
-                    ..b
-                });
-                lives.push(life);
-            }
+            _ => lives.push(Lifetime::at(*sign, gone)),
         }
         open = true;
     }
@@ -341,14 +344,12 @@ impl Pulse {
         recorder: &[Span],
     ) -> Option<Self> {
         let last = stretches.last()?;
-        let away = |p: &[Stretch]| {
-            restarts
-                .iter()
-                .any(|r| p[0].last <= r.birth && r.death <= p[1].first)
-        };
-        let is_own = |p: &&[Stretch]| !hide(recorder, (p[0].last, Some(p[1].first)));
-        let pauses = stretches.windows(2).filter(|p| !away(p)).filter(is_own);
-        let pauses = pauses.map(|p| p[1].first.since(p[0].last));
+        let pauses = stretches.windows(2).map(|p| (p[0].last, p[1].first));
+        let pauses = pauses.filter(|(from, to)| {
+            let mut away = restarts.iter().map(|r| *from <= r.birth && r.death <= *to);
+            !away.any(|is_away| is_away) && !hide(recorder, (*from, Some(*to)))
+        });
+        let pauses = pauses.map(|(from, to)| to.since(from));
         (last.count >= FEWEST).then(|| Self {
             first: stretches[0].first,
             last: last.last,
@@ -631,12 +632,8 @@ impl Liveness {
         self.ends.sort_unstable();
         self.ends.dedup();
         self.stated.sort_unstable();
-        if self.is_whole() || self.signs.is_empty() {
-            self.lives = if self.is_whole() {
-                Rc::clone(node)
-            } else {
-                Rc::default()
-            };
+        if self.is_whole() {
+            self.lives = Rc::clone(node);
             return;
         }
         let mut own = Vec::new();
@@ -682,12 +679,12 @@ impl Liveness {
         let mut until = Stamp::MIN;
         for life in Rc::make_mut(&mut self.lives) {
             let around = |o: &&Lifetime| o.from() < life.from() && life.from() <= o.to();
-            if let Some(other) = others.iter().find(around).filter(|o| until < o.from())
-                && !self
-                    .ends
-                    .iter()
-                    .any(|end| other.from() <= *end && *end < life.from())
-            {
+            let is_absent = |from: Stamp| {
+                let mut ends = self.ends.iter();
+                ends.any(|end| from <= *end && *end < life.from())
+            };
+            let other = others.iter().find(around).filter(|o| until < o.from());
+            if let Some(other) = other.filter(|other| !is_absent(other.from())) {
                 life.begin_at(other.from(), other.began);
                 is_earlier = true;
             }

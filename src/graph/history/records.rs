@@ -6,6 +6,7 @@ use std::io;
 use std::sync::Arc;
 
 use crate::base::error::Result;
+use crate::base::ids::Few;
 use crate::base::role::role;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::{Recorded, spool_error};
@@ -13,15 +14,15 @@ use crate::evidence::conclude::Findings;
 use crate::evidence::inference::{ElementKey, IncidentKind};
 use crate::evidence::observation::Name;
 use crate::evidence::{Confidence, Evidence};
-use crate::graph::history::lifetimes::Lifetime;
-use crate::graph::history::lifetimes::Liveness;
-use crate::graph::history::lifetimes::compute_lifetimes;
-use crate::graph::history::recordings::{doubled, pauses};
+use crate::graph::history::lifetimes::{Lifetime, Liveness, LivenessOf, compute_lifetimes};
+use crate::graph::history::liveness::{collect, fall_silent};
+use crate::graph::history::pauses::pauses;
+use crate::graph::history::recordings::doubled;
 use crate::graph::history::restarts::restarts;
 use crate::graph::history::senders::{Sender as TopicSender, Traffic};
-use crate::graph::history::tracks::fall_silent;
-use crate::graph::history::tracks::{Tracks, tracks};
-use crate::graph::history::{Bound, Life, Sender, Sending, Stretch, Transition, all_silent};
+use crate::graph::history::{
+    Bound, Life, Sender, Sending, Silence, Stretch, Transition, all_silent,
+};
 use crate::graph::{
     ById, Edge, Element, Elements, Existence, Node, NodeId, PerElement, State, Topic, TopicId,
 };
@@ -71,31 +72,23 @@ pub(crate) struct Record {
     /// Whether it is silent without a message in the window.
     needs_messages: bool,
     /// The times at which it was silent although it existed; `None` for a silence to the end.
-    silences: Vec<(Stamp, Option<Stamp>)>,
+    silences: Vec<Silence>,
 }
 
 impl Record {
-    fn new(
-        track: &Liveness,
-        mission: (Stamp, Stamp),
-        silences: Vec<(Stamp, Option<Stamp>)>,
-    ) -> Self {
-        let fixed = match () {
-            () if track.is_declared() => Some(State::Declared),
-            () if track.is_latched() => Some(State::Latched),
-            () => None,
-        };
+    fn new(liveness: &Liveness, mission: (Stamp, Stamp), silences: Vec<Silence>) -> Self {
+        let is_latched = liveness.is_latched().then_some(State::Latched);
         Self {
-            confidence: track.confidence,
-            lives: known(track, mission),
-            fixed,
-            needs_messages: !track.has_senders(),
+            confidence: liveness.confidence,
+            lives: known(liveness, mission),
+            fixed: (liveness.is_declared().then_some(State::Declared)).or(is_latched),
+            needs_messages: !liveness.has_senders(),
             silences,
         }
     }
 
     /// The times at which it was silent although it existed; `None` for a silence to the end.
-    pub(crate) fn silences(&self) -> &[(Stamp, Option<Stamp>)] {
+    pub(crate) fn silences(&self) -> &[Silence] {
         &self.silences
     }
 
@@ -106,9 +99,8 @@ impl Record {
 
     /// The state in a window in which it exists, with or without messages of its own.
     pub(crate) fn state(&self, window: Span, has_messages: bool) -> State {
-        let covers = |(from, to): &(Stamp, Option<Stamp>)| {
-            *from < window.start && to.is_none_or(|to| window.end <= to)
-        };
+        let covers =
+            |(from, to): &Silence| *from < window.start && to.is_none_or(|to| window.end <= to);
         match self.fixed {
             Some(state) => state,
             None if has_messages => State::Active,
@@ -144,61 +136,60 @@ fn of_elements(
     let doubled = doubled(recorded, &findings.streams);
     let restarts = restarts(recorded, findings, traffic, &doubled)?;
     let pauses = pauses(recorded, traffic, &restarts, &findings.streams)?;
-    let (mut tracks, likes) = tracks(recorded, findings, traffic, (&restarts, &pauses))?;
-    fall_silent(&mut tracks, traffic, findings, &pauses);
-    compute_lifetimes(&mut tracks, &likes, &restarts, findings.mission);
-    Ok(assembled(tracks, traffic, findings, (pauses, doubled)))
+    let (mut liveness_of, likes) = collect(recorded, findings, traffic, (&restarts, &pauses))?;
+    fall_silent(&mut liveness_of, traffic, findings, &pauses);
+    compute_lifetimes(&mut liveness_of, &likes, &restarts, findings.mission);
+    Ok(assembled(liveness_of, traffic, findings, (pauses, doubled)))
 }
 
-/// Lists every element. Tracks are sorted by the elements' names.
+/// Lists every element. `liveness_of` is sorted by the elements' names.
 fn assembled(
-    tracks: Tracks,
+    liveness_of: LivenessOf,
     traffic: &Traffic,
     findings: &Findings,
     (pauses, doubled): (Vec<Span>, BTreeSet<Name>),
 ) -> History {
-    let streams = traffic.iter().map(|of| {
-        let streams = of.as_ref().map(|of| of.streams.clone());
-        streams.unwrap_or_default()
+    let streams = traffic.iter().map(|of| match of {
+        Some(of) => of.streams.clone(),
+        None => Vec::new(),
     });
     let mut all = Assembly {
         history: History {
             streams: streams.collect(),
             pauses,
-            ..roomy(&tracks)
+            ..roomy(&liveness_of)
         },
         findings,
         traffic,
         publishers: ById::default(),
         sent: sent(traffic),
     };
-    for (what, track) in &tracks {
-        if let (ElementKey::Publish(_, topic), false) = (what, track.evidence.is_guess()) {
+    for (what, liveness) in &liveness_of {
+        if let (ElementKey::Publish(_, topic), false) = (what, liveness.evidence.is_guess()) {
             *all.publishers.grown(*topic) += 1;
         }
     }
-    for (what, track) in tracks {
+    for (what, liveness) in liveness_of {
         match what {
-            ElementKey::Node(node) => all.node(node, &track),
-            ElementKey::Topic(topic) => all.topic(topic, &track),
-            ElementKey::Publish(node, topic) => all.publish(node, topic, &track),
-            ElementKey::Subscribe(topic, node) => all.subscribe(topic, node, &track),
+            ElementKey::Node(node) => all.node(node, &liveness),
+            ElementKey::Topic(topic) => all.topic(topic, &liveness),
+            ElementKey::Publish(node, topic) => all.publish(node, topic, &liveness),
+            ElementKey::Subscribe(topic, node) => all.subscribe(topic, node, &liveness),
         }
     }
     all.senders();
     all.transitions();
     all.incidents();
-    let ids = doubled
-        .iter()
-        .filter_map(|node| all.history.node_ids.some(*node));
+    let ids = doubled.iter();
+    let ids = ids.filter_map(|node| all.history.node_ids.some(*node));
     all.history.doubled = ids.copied().collect();
     all.history
 }
 
 /// A history with capacity for exactly these elements, since there may be very many.
-fn roomy(tracks: &Tracks) -> History {
+fn roomy(liveness_of: &LivenessOf) -> History {
     let mut many = [0; 4];
-    for what in tracks.keys() {
+    for what in liveness_of.keys() {
         many[match what {
             ElementKey::Node(_) => 0,
             ElementKey::Topic(_) => 1,
@@ -217,8 +208,8 @@ fn roomy(tracks: &Tracks) -> History {
 }
 
 /// The messages that each node sends, without latched ones.
-fn sent(traffic: &Traffic) -> ById<Name, Vec<&TopicSender>> {
-    let mut sent: ById<Name, Vec<&TopicSender>> = ById::default();
+fn sent(traffic: &Traffic) -> Few<Name, Vec<&TopicSender>> {
+    let mut sent: Few<Name, Vec<&TopicSender>> = Few::default();
     let senders = traffic.iter().flatten().flat_map(|of| &of.list);
     for sender in senders.filter(|sender| !sender.latched) {
         if let Some(node) = sender.node {
@@ -235,7 +226,7 @@ struct Assembly<'a> {
     /// The number of known publishers of each topic.
     publishers: ById<Name, u32>,
     /// The messages that each node sends, without latched ones.
-    sent: ById<Name, Vec<&'a TopicSender>>,
+    sent: Few<Name, Vec<&'a TopicSender>>,
 }
 
 impl Assembly<'_> {
@@ -296,27 +287,27 @@ impl Assembly<'_> {
         }
     }
 
-    fn node(&mut self, name: Name, track: &Liveness) {
-        let silent = self.node_silences(name, &spans(track));
+    fn node(&mut self, name: Name, liveness: &Liveness) {
+        let silent = self.node_silences(name, &spans(liveness));
         let all = &mut self.history;
         let text = self.findings.text(name);
         let id = all.elements.nodes.push(Node {
             role: role(&text).into(),
             name: text.into(),
-            seen: seen(track),
+            seen: seen(liveness),
         });
         *all.node_ids.grown(name) = Some(id);
-        let mut record = Record::new(track, self.findings.mission, silent);
+        let mut record = Record::new(liveness, self.findings.mission, silent);
         // A node's lifetime depends on more than messages.
         record.needs_messages = false;
-        if track.speaks && !record.is_declared() {
+        if liveness.speaks && !record.is_declared() {
             record.fixed = None;
         }
         all.records.push(Element::Node(id), record);
     }
 
-    fn topic(&mut self, name: Name, track: &Liveness) {
-        let silent = self.topic_silences(name, &spans(track));
+    fn topic(&mut self, name: Name, liveness: &Liveness) {
+        let silent = self.topic_silences(name, &spans(liveness));
         let unknown_publishers = self.unknown_publishers(name);
         let traffic = self.traffic.some(name);
         let streams = traffic.iter().flat_map(|of| &of.streams);
@@ -332,14 +323,14 @@ impl Assembly<'_> {
         let id = all.elements.topics.push(Topic {
             name: self.findings.text(name).into(),
             types,
-            seen: seen(track),
+            seen: seen(liveness),
             qos: values.quality(name),
             unknown_publishers,
         });
         *all.topic_ids.grown(name) = Some(id);
         let pauses = traffic.map(|of| of.pauses.clone());
         all.sending.pauses.push(pauses.unwrap_or_default());
-        self.keep(Element::Topic(id), track, silent);
+        self.keep(Element::Topic(id), liveness, silent);
     }
 
     /// The number of publishers of a topic that the bag counts beyond the known ones.
@@ -349,48 +340,48 @@ impl Assembly<'_> {
         Some(counted.saturating_sub(*known))
     }
 
-    fn publish(&mut self, node: Name, topic: Name, track: &Liveness) {
-        let Some(edge) = self.edge(node, topic, track) else {
+    fn publish(&mut self, node: Name, topic: Name, liveness: &Liveness) {
+        let Some(edge) = self.edge(node, topic, liveness) else {
             return;
         };
         let senders = self.traffic.some(topic).map(|of| &of.list);
         let sender = senders.and_then(|all| all.iter().find(|s| s.node == Some(node)));
-        let silent = self.silences(sender.into_iter(), &spans(track));
+        let silent = self.silences(sender.into_iter(), &spans(liveness));
         let id = self.history.elements.publishes.push(edge);
-        self.keep(Element::Publish(id), track, silent);
+        self.keep(Element::Publish(id), liveness, silent);
     }
 
-    fn subscribe(&mut self, topic: Name, node: Name, track: &Liveness) {
-        let Some(edge) = self.edge(node, topic, track) else {
+    fn subscribe(&mut self, topic: Name, node: Name, liveness: &Liveness) {
+        let Some(edge) = self.edge(node, topic, liveness) else {
             return;
         };
         let id = self.history.elements.subscribes.push(edge);
-        self.keep(Element::Subscribe(id), track, Vec::new());
+        self.keep(Element::Subscribe(id), liveness, Vec::new());
     }
 
     /// Adds the record of the newest element of a kind.
-    fn keep(&mut self, what: Element, track: &Liveness, silent: Vec<(Stamp, Option<Stamp>)>) {
-        let record = Record::new(track, self.findings.mission, silent);
+    fn keep(&mut self, what: Element, liveness: &Liveness, silent: Vec<Silence>) {
+        let record = Record::new(liveness, self.findings.mission, silent);
         self.history.records.push(what, record);
     }
 
     /// An edge between elements that were added before; `None` if one of them was not.
-    fn edge(&self, node: Name, topic: Name, track: &Liveness) -> Option<Edge> {
+    fn edge(&self, node: Name, topic: Name, liveness: &Liveness) -> Option<Edge> {
         Some(Edge {
             node: *self.history.node_ids.some(node)?,
             topic: *self.history.topic_ids.some(topic)?,
-            seen: seen(track),
+            seen: seen(liveness),
         })
     }
 
     /// The times at which all senders of a topic are silent.
-    fn topic_silences(&self, topic: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
+    fn topic_silences(&self, topic: Name, lives: &[Span]) -> Vec<Silence> {
         let all = self.traffic.some(topic).into_iter().flat_map(|of| &of.list);
         self.silences(all.filter(|sender| !sender.latched), lives)
     }
 
     /// The times at which a node is silent on all its topics.
-    fn node_silences(&self, node: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
+    fn node_silences(&self, node: Name, lives: &[Span]) -> Vec<Silence> {
         let of = self.sent.of(node).iter().copied();
         self.silences(of, lives)
     }
@@ -400,7 +391,7 @@ impl Assembly<'_> {
         &self,
         senders: impl Iterator<Item = &'s TopicSender> + Clone,
         lives: &[Span],
-    ) -> Vec<(Stamp, Option<Stamp>)> {
+    ) -> Vec<Silence> {
         let lives = TopicSender::within(senders.clone(), lives);
         let of: Vec<&[Stretch]> = senders.map(|sender| &sender.stretches[..]).collect();
         all_silent(&of, &lives, &self.history.pauses)
@@ -408,29 +399,29 @@ impl Assembly<'_> {
 }
 
 /// The intervals in which an element exists, half-open.
-fn seen(track: &Liveness) -> Existence {
-    let (first, last) = track.bounds();
+fn seen(liveness: &Liveness) -> Existence {
+    let (first, last) = liveness.bounds();
     Existence {
-        evidence: track.evidence,
+        evidence: liveness.evidence,
         first,
         last,
-        lives: spans(track),
+        lives: spans(liveness),
     }
 }
 
-fn spans(track: &Liveness) -> Vec<Span> {
+fn spans(liveness: &Liveness) -> Vec<Span> {
     let span = |life: &Lifetime| Span::new(life.from(), life.to().plus(1));
-    track.lives.iter().map(span).collect()
+    liveness.lives.iter().map(span).collect()
 }
 
 /// The known lifetimes of an element, inside the mission.
-fn known(track: &Liveness, mission: (Stamp, Stamp)) -> Vec<Life> {
+fn known(liveness: &Liveness, mission: (Stamp, Stamp)) -> Vec<Life> {
     let within = |bound: Bound| Bound {
         earliest: bound.earliest.max(mission.0),
         latest: bound.latest.min(mission.1),
         ..bound
     };
-    let lives = spans(track).into_iter().zip(track.lives.iter());
+    let lives = spans(liveness).into_iter().zip(liveness.lives.iter());
     let life = |(span, life): (Span, &Lifetime)| Life {
         span,
         began: life.began.map(within),

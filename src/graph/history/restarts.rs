@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use crate::base::error::Result;
+use crate::base::ids::Few;
 use crate::base::name::is_log;
 use crate::base::rhythm::{FEWEST, GAP, GAP_NS};
 use crate::base::time::Stamp;
@@ -14,7 +15,6 @@ use crate::evidence::conclude::Findings;
 use crate::evidence::inference::{Inference, Reliability, Validity};
 use crate::evidence::numbers::Number;
 use crate::evidence::observation::Name;
-use crate::graph::ById;
 use crate::graph::history::Stretch;
 use crate::graph::history::senders::{Sender, Traffic};
 
@@ -26,12 +26,13 @@ pub(crate) struct Restart {
 }
 
 /// Restarts by node, sorted by time.
-pub(crate) type Restarts = ById<Name, Vec<Restart>>;
+pub(crate) type Restarts = Few<Name, Vec<Restart>>;
 
 /// The most messages of a latched topic: one with more is sent again all the time, so that a repetition shows nothing.
-const LATCHED: u64 = 20;
+/// A map is sent once per start; with more, parameters that are republished every few seconds would be restarts.
+pub(super) const LATCHED: u64 = 20;
 /// The most gaps, of all nodes together, around which numbers are requested: each requires reading two
-/// chunks.
+/// chunks, so that so many take a second. Missions have a few dozen gaps.
 const MOST_ASKED: usize = 256;
 
 /// A stream of a node, and the messages on its topic.
@@ -72,20 +73,16 @@ impl Own<'_> {
     /// The times of its messages, sorted.
     fn times(&self, recorded: &Recorded) -> io::Result<Vec<Stamp>> {
         let of = |at: &usize| recorded.messages.times(recorded.streams[*at].times);
-        let mut times = self
-            .streams
-            .iter()
-            .map(of)
-            .collect::<io::Result<Vec<_>>>()?
-            .concat();
+        let times = self.streams.iter().map(of);
+        let mut times = times.collect::<io::Result<Vec<_>>>()?.concat();
         times.sort_unstable();
         Ok(times)
     }
 }
 
 /// The streams of each publisher with a reliable name.
-fn own_streams<'a>(findings: &Findings, traffic: &'a Traffic) -> ById<Name, Vec<Own<'a>>> {
-    let mut own: ById<Name, Vec<Own<'a>>> = ById::default();
+fn own_streams<'a>(findings: &Findings, traffic: &'a Traffic) -> Few<Name, Vec<Own<'a>>> {
+    let mut own: Few<Name, Vec<Own<'a>>> = Few::default();
     for (topic, all) in traffic.somes() {
         let mut streams: Vec<Vec<usize>> = vec![Vec::new(); all.list.len()];
         for (at, of) in all.streams.iter().zip(&all.of) {
@@ -108,9 +105,7 @@ fn own_streams<'a>(findings: &Findings, traffic: &'a Traffic) -> ById<Name, Vec<
 /// The gaps in any of a node's streams during which none of its other streams continued.
 fn gaps(recorded: &Recorded, own: &[Own<'_>]) -> io::Result<BTreeSet<(Stamp, Stamp)>> {
     let steady = own.iter().filter(|own| !own.sender.latched);
-    let pairs = steady.flat_map(|own| own.sender.stretches.windows(2));
-    let apart = pairs.filter(|pair| !pair[1].is_joined);
-    let mut gaps: BTreeSet<_> = apart.map(|pair| (pair[0].last, pair[1].first)).collect();
+    let mut gaps: BTreeSet<_> = steady.flat_map(|own| own.sender.gaps()).collect();
     for one in own {
         // Read on demand, and only for streams with few messages.
         let mut times = None;
@@ -166,12 +161,13 @@ fn numbered(recorded: &Recorded, own: &Own<'_>) -> io::Result<Vec<(usize, Vec<St
 fn around_all(streams: &[(usize, Vec<Stamp>)], gap: (Stamp, Stamp)) -> Option<(Place, Place)> {
     let middle = middle(gap);
     let cut = |times: &[Stamp]| times.partition_point(|time| *time <= middle);
-    let before = streams
-        .iter()
-        .filter_map(|(at, times)| Some((*times.get(cut(times).checked_sub(1)?)?, *at)));
-    let after = streams
-        .iter()
-        .filter_map(|(at, times)| Some((*times.get(cut(times))?, *at)));
+    let all = || {
+        streams
+            .iter()
+            .map(|(at, times)| (times.split_at(cut(times)), *at))
+    };
+    let before = all().filter_map(|((before, _), at)| Some((*before.last()?, at)));
+    let after = all().filter_map(|((_, after), at)| Some((*after.first()?, at)));
     Some((before.max()?, after.min()?))
 }
 
@@ -182,7 +178,7 @@ pub(crate) fn unread(
     traffic: &Traffic,
 ) -> Result<BTreeSet<(usize, Stamp)>> {
     let mut asked = BTreeSet::new();
-    for own in &own_streams(findings, traffic) {
+    for (_, own) in own_streams(findings, traffic).with_ids() {
         let is_unread = |at: &&usize| {
             let read = recorded.numbers.some(**at).map(|numbers| numbers.read);
             read.is_some_and(|read| read < recorded.messages.count(recorded.streams[**at].times))
@@ -220,16 +216,12 @@ pub(crate) fn restarts(
     for node in doubled {
         nodes.grown(*node).clear();
     }
-    let falls = nodes
-        .with_ids()
-        .map(|(node, own)| falls_of(recorded, findings, node, own));
-    let falls: ById<Name, Vec<Fall>> = falls.collect::<io::Result<_>>()?;
+    let falls = nodes.with_ids();
+    let falls = falls.map(|(node, own)| Ok((node, falls_of(recorded, findings, node, own)?)));
+    let falls: Few<Name, Vec<Fall>> = falls.collect::<io::Result<_>>()?;
     let mut alike: BTreeMap<_, Vec<(Name, &Fall)>> = BTreeMap::new();
-    for (node, fall) in falls
-        .with_ids()
-        .flat_map(|(node, of)| of.iter().map(move |f| (node, f)))
-    {
-        if fall.first.stamp != 0 {
+    for (node, of) in falls.with_ids() {
+        for fall in of.iter().filter(|fall| fall.first.stamp != 0) {
             alike.entry(fall.header()).or_default().push((node, fall));
         }
     }
@@ -240,7 +232,7 @@ pub(crate) fn restarts(
             let mut alike = alike.get(&fall.header()).into_iter().flatten();
             alike.any(|(other, of)| *other != node && fall.is_later_than(of))
         };
-        let own_falls = falls[node].iter().filter(|fall| !is_copy(fall));
+        let own_falls = falls.of(node).iter().filter(|fall| !is_copy(fall));
         let mut breaks: Vec<_> = own_falls.map(|fall| (fall.from, fall.to)).collect();
         breaks.extend(sent_again(recorded, own)?);
         let mut breaks = narrowed(breaks);
@@ -269,10 +261,8 @@ fn counts_on(recorded: &Recorded, log: &Own<'_>, gap: (Stamp, Stamp)) -> bool {
     log.streams.iter().any(|at| {
         let times = recorded.messages.times(recorded.streams[*at].times);
         let around = times.ok().and_then(|times| around(&times, gap));
-        let numbers = recorded.numbers.some(*at);
-        around
-            .zip(numbers)
-            .is_some_and(|((from, to), numbers)| numbers.count_on(from, to))
+        let both = around.zip(recorded.numbers.some(*at));
+        both.is_some_and(|((from, to), numbers)| numbers.count_on(from, to))
     })
 }
 
@@ -333,11 +323,8 @@ fn falls_of(
                 (all.0.max(gap.0), all.1.min(gap.1))
             });
             // Which of several gaps the restart was in, this stream does not show.
-            let (from, to) = if common.0 < common.1 {
-                common
-            } else {
-                (last, next)
-            };
+            let is_one = common.0 < common.1;
+            let (from, to) = if is_one { common } else { (last, next) };
             let begun = numbers.filter(|(before, first)| first.begins_after(*before));
             falls.extend(begun.map(|(number, first)| Fall {
                 from,
@@ -366,25 +353,19 @@ fn between_records(
         |(at, times): &(usize, Vec<Stamp>)| Some(((*times.first()?, *at), (*times.last()?, *at)));
     let mut parts: Vec<(Place, Place)> = streams.iter().filter_map(ends).collect();
     parts.sort_unstable();
-    let next: Vec<(Place, Place)> = parts
-        .windows(2)
-        .map(|pair| (pair[0].1, pair[1].0))
-        .collect();
-    let next = next.into_iter().filter(|(last, first)| last.0 < first.0);
+    let next = parts.windows(2).map(|pair| (pair[0].1, pair[1].0));
+    let next: Vec<_> = next.filter(|(last, first)| last.0 < first.0).collect();
     let inside = streams.iter().flat_map(|(at, _)| {
-        let falls = recorded
-            .numbers
-            .some(*at)
-            .into_iter()
-            .flat_map(|own| &own.falls);
+        let numbers = recorded.numbers.some(*at).into_iter();
+        let falls = numbers.flat_map(|own| &own.falls);
         falls.map(|(from, to)| ((*from, *at), (*to, *at)))
     });
-    next.chain(inside)
+    next.into_iter().chain(inside)
 }
 
 /// All statements about each node.
-fn said(inferences: &[Inference]) -> ById<Name, Vec<&Inference>> {
-    let mut of: ById<Name, Vec<&Inference>> = ById::default();
+fn said(inferences: &[Inference]) -> Few<Name, Vec<&Inference>> {
+    let mut of: Few<Name, Vec<&Inference>> = Few::default();
     for inference in inferences {
         if let [Some(node), _] = inference.what.ends() {
             of.grown(node).push(inference);
@@ -414,11 +395,8 @@ fn sent_again(recorded: &Recorded, own: &[Own<'_>]) -> io::Result<Vec<(Stamp, St
     if rhythms().next().is_none() {
         return Ok(found);
     }
-    for at in own
-        .iter()
-        .filter(|own| own.sender.latched)
-        .flat_map(|own| &own.streams)
-    {
+    let latched = own.iter().filter(|own| own.sender.latched);
+    for at in latched.flat_map(|own| &own.streams) {
         let latched = recorded.streams[*at].times;
         if !(2..=LATCHED).contains(&recorded.messages.count(latched)) {
             continue;

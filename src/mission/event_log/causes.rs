@@ -1,9 +1,9 @@
 //! One headline per cause: consequences of another event, repeated appearances, and simultaneous events of many
-//! elements become parts of one event.
+//! elements become parts of one event. Each rule below has an example.
 
 use std::collections::BTreeMap;
 
-use super::make::{Drafts, LogInput};
+use super::drafts::{Drafts, LogInput};
 use super::{Detail, Event, EventId, Kind};
 use crate::base::rhythm::{CLOSE_NS, CROWD_NS, FLAPS, SAME_STEP, TOGETHER_NS};
 use crate::base::time::Stamp;
@@ -15,8 +15,8 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     let wiring = wiring(context);
     subscribers(context, &wiring, drafts);
     follow_inputs(context, &wiring, drafts);
-    flaps(context, drafts);
-    crowds(context, drafts);
+    flaps(drafts);
+    simultaneous(context, drafts);
     drafts.flatten();
 }
 
@@ -44,8 +44,8 @@ fn by<K: Ord>(
     of
 }
 
-/// The node and the kind of a turn: a start or a stop.
-fn turn(event: &Event) -> Option<(NodeId, Kind)> {
+/// The node that an event is about, if that started or stopped.
+fn limit(event: &Event) -> Option<(NodeId, Kind)> {
     match (event.what, event.kind) {
         (Element::Node(node), Kind::Started | Kind::Stopped) => Some((node, event.kind)),
         _ => None,
@@ -53,10 +53,10 @@ fn turn(event: &Event) -> Option<(NodeId, Kind)> {
 }
 
 /// A node that is known only from one topic's messages need not have stopped or started when another node
-/// takes that topic over.
+/// takes that topic over: if `/joystick` is known from `/cmd_vel` alone and `/nav` takes it over, `/joystick` is still there.
 fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
-    let turns = headlines(drafts, &[Kind::Started, Kind::Stopped]);
-    let turns = by(drafts, turns, turn);
+    let limits = headlines(drafts, &[Kind::Started, Kind::Stopped]);
+    let limits = by(drafts, limits, limit);
     let steps = by(drafts, headlines(drafts, &[Kind::Rate]), |event| {
         let (node, topic) = context.elements.ends(event.what);
         topic.filter(|_| node.is_some())
@@ -88,9 +88,9 @@ fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
         ];
         for (nodes, kind, at) in ends {
             for node in nodes.iter().filter(|node| is_only_sender(**node, topic)) {
-                for turn in turns.get(&(*node, kind)).into_iter().flatten() {
-                    if is_within(drafts.get(*turn).time, at, TOGETHER_NS) {
-                        drafts.fold(*turn, hand);
+                for id in limits.get(&(*node, kind)).into_iter().flatten() {
+                    if is_within(drafts.get(*id).time, at, TOGETHER_NS) {
+                        drafts.fold(*id, hand);
                     }
                 }
             }
@@ -98,9 +98,10 @@ fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
     }
 }
 
-/// Subscriptions that appear or vanish with the topic's publisher are consequences.
+/// Subscriptions that appear or vanish with the topic's publisher are consequences: `/viewer` subscribes to `/map` again when
+/// `/map_server` has restarted.
 fn subscribers(context: &LogInput<'_>, wiring: &Wiring, drafts: &mut Drafts) {
-    let turns = by(drafts, drafts.list.ids(), turn);
+    let limits = by(drafts, drafts.list.ids(), limit);
     for id in headlines(drafts, &[Kind::Appeared, Kind::Vanished]) {
         let event = drafts.get(id);
         let (Element::Subscribe(_), (_, Some(topic))) =
@@ -108,18 +109,16 @@ fn subscribers(context: &LogInput<'_>, wiring: &Wiring, drafts: &mut Drafts) {
         else {
             continue;
         };
-        let senders = wiring.publishers[topic].iter();
         let kind = match event.kind {
             Kind::Appeared => Kind::Started,
             _ => Kind::Stopped,
         };
-        let of = senders.filter_map(|node| turns.get(&(*node, kind)));
-        let is_then = |turn: &EventId| {
-            let turn = drafts.get(*turn);
-            is_within(turn.time, event.time, TOGETHER_NS)
-        };
-        let cause = of.flatten().copied().find(is_then);
-        if let Some(cause) = cause {
+        let senders = wiring.publishers[topic].iter();
+        let mut of = senders
+            .filter_map(|node| limits.get(&(*node, kind)))
+            .flatten();
+        let cause = of.find(|id| is_within(drafts.get(**id).time, event.time, TOGETHER_NS));
+        if let Some(cause) = cause.copied() {
             drafts.fold(id, cause);
         }
     }
@@ -128,7 +127,7 @@ fn subscribers(context: &LogInput<'_>, wiring: &Wiring, drafts: &mut Drafts) {
 /// The ends of each topic, without housekeeping.
 fn wiring(context: &LogInput<'_>) -> Wiring {
     context.elements.wiring(|node, topic| {
-        !context.is_by_the_way(topic) && !context.is_quiet(Element::Node(node))
+        !context.is_by_the_way(topic) && !context.elements.nodes[node].is_tool()
     })
 }
 
@@ -140,7 +139,8 @@ fn senders(context: &LogInput<'_>, wiring: &Wiring, what: Element) -> Vec<NodeId
     }
 }
 
-/// A silence that begins within an input's pause is a part of it, and so is a rate change that an input has too.
+/// A silence that begins within an input's pause is a part of it, and so is a rate change that an input has too: `/detector` is
+/// silent while `/camera` is, and sends at half its rate when `/camera` does.
 fn follow_inputs(context: &LogInput<'_>, wiring: &Wiring, drafts: &mut Drafts) {
     let mut pauses: BTreeMap<Element, Vec<EventId>> = BTreeMap::new();
     let mut steps: BTreeMap<TopicId, Vec<EventId>> = BTreeMap::new();
@@ -188,65 +188,61 @@ fn follows(silence: &Event, pause: &Event) -> bool {
     pause.what != silence.what && pause.time <= silence.time.plus(CROWD_NS) && silence.time <= until
 }
 
-/// Whether two rate changes are about equal, and less than `apart` nanoseconds apart.
-fn is_same_step(one: &Event, other: &Event, apart: i64) -> bool {
+/// Whether two rate changes are about equal, and at most `within` nanoseconds from each other.
+fn is_same_step(one: &Event, other: &Event, within: i64) -> bool {
     let ratio = |event: &Event| match event.detail {
         Detail::Rates { from_hz, to_hz } => to_hz / from_hz,
         _ => f64::NAN,
     };
     let between = ratio(one) / ratio(other);
     let is_near =
-        one.earliest <= other.latest.plus(apart) && other.earliest <= one.latest.plus(apart);
+        one.earliest <= other.latest.plus(within) && other.earliest <= one.latest.plus(within);
     one.what != other.what && is_near && (1.0 / SAME_STEP..=SAME_STEP).contains(&between)
 }
 
-/// An edge or topic that appears and vanishes repeatedly is one event.
-fn flaps(context: &LogInput<'_>, drafts: &mut Drafts) {
-    let mut of: BTreeMap<Element, Vec<EventId>> = BTreeMap::new();
-    for id in headlines(drafts, &[Kind::Appeared, Kind::Vanished]) {
-        of.entry(drafts.get(id).what).or_default().push(id);
-    }
-    for (what, turns) in of {
+/// An edge or topic that appears and vanishes repeatedly is one event: a viewer that subscribes to `/image` ten times.
+fn flaps(drafts: &mut Drafts) {
+    let all = headlines(drafts, &[Kind::Appeared, Kind::Vanished]);
+    for own in by(drafts, all, |event| Some(event.what)).values() {
         let is_begin = |id: &&EventId| drafts.get(**id).kind == Kind::Appeared;
-        let many = turns.iter().filter(is_begin).count();
-        let [first, .., last] = turns[..] else {
+        let many = own.iter().filter(is_begin).count();
+        let [first, rest @ .., last] = &own[..] else {
             continue;
         };
-        if many < FLAPS || context.is_quiet(what) {
+        if many < FLAPS {
             continue;
         }
-        let until = drafts.get(last).time;
-        let event = &mut drafts.list[first];
+        let until = drafts.get(*last).time;
+        let event = &mut drafts.list[*first];
         event.detail = Detail::Count(many as u64);
         event.until = Some(until);
-        for turn in &turns[1..] {
-            drafts.fold(*turn, first);
+        for id in rest.iter().chain([last]) {
+            drafts.fold(*id, *first);
         }
     }
 }
 
 /// Simultaneous events of many elements are one event: connections of one node or topics of unknown publishers that
-/// appear or vanish, silences that begin and end together, equal rate changes.
-fn crowds(context: &LogInput<'_>, drafts: &mut Drafts) {
+/// appear or vanish, silences that begin and end together, equal rate changes. For example, a switch of the network fails, and
+/// twelve topics are silent from 40 s to 43 s.
+fn simultaneous(context: &LogInput<'_>, drafts: &mut Drafts) {
     for kind in [Kind::Appeared, Kind::Vanished, Kind::Silent, Kind::Rate] {
-        let mut of: BTreeMap<Option<NodeId>, Vec<EventId>> = BTreeMap::new();
-        for id in headlines(drafts, &[kind]) {
-            let node = context.elements.ends(drafts.get(id).what).0;
-            // The silences of several nodes have one cause, and so have equal rate changes.
-            let whose = node.filter(|_| !matches!(kind, Kind::Silent | Kind::Rate));
-            of.entry(whose).or_default().push(id);
-        }
+        // The silences of several nodes have one cause, and so have equal rate changes.
+        let is_of_any = matches!(kind, Kind::Silent | Kind::Rate);
+        let of = by(drafts, headlines(drafts, &[kind]), |event| {
+            let node = context.elements.ends(event.what).0;
+            Some(node.filter(|_| !is_of_any))
+        });
         for places in of.values() {
             for (at, first) in places.iter().enumerate() {
                 let one = drafts.get(*first).clone();
                 if !one.is_headline() {
                     continue;
                 }
-                let rest = places[at + 1..].iter().copied();
-                let soon =
-                    rest.take_while(|id| is_within(drafts.get(*id).time, one.time, CLOSE_NS));
-                let alike: Vec<EventId> =
-                    soon.filter(|id| is_alike(&one, drafts.get(*id))).collect();
+                let rest = places[at + 1..].iter().map(|id| (*id, drafts.get(*id)));
+                let soon = rest.take_while(|(_, other)| is_within(other.time, one.time, CLOSE_NS));
+                let alike = soon.filter(|(_, other)| is_alike(&one, other));
+                let alike: Vec<EventId> = alike.map(|(id, _)| id).collect();
                 for id in alike {
                     drafts.fold(id, *first);
                 }
@@ -268,8 +264,8 @@ fn is_alike(first: &Event, other: &Event) -> bool {
         }
 }
 
-fn is_within(a: Stamp, b: Stamp, apart: i64) -> bool {
-    a.since(b).abs() <= apart
+fn is_within(a: Stamp, b: Stamp, within: i64) -> bool {
+    a.since(b).abs() <= within
 }
 
 #[cfg(test)]

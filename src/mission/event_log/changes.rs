@@ -1,11 +1,17 @@
-//! The changes between windows, each with the event that explains it.
+//! Events and windows: the changes between windows, each with the event that explains it; and, for missions of which only
+//! windows are known, the log made from these changes.
+//!
+//! For example, `/nav` starts at 12.4 s and publishes `/plan`: in the window from 10 s to 20 s three elements were added, and
+//! all three belong to the event of the node.
 
 use std::collections::BTreeMap;
 
-use super::{Detail, Event, EventId, EventLog, Kind, described};
+use super::drafts::sorted_by;
+use super::{Detail, Event, EventId, EventLog, Kind};
 use crate::base::time::{Span, Stamp};
 use crate::graph::diff::{Change, ValueKind};
-use crate::graph::{Element, Elements, Graphs};
+use crate::graph::history::Bound;
+use crate::graph::{ById, Edge, Element, Elements, Graphs, Id as _, NodeId, TopicId};
 use crate::mission::Window;
 
 /// The changes of each window since the previous one, with the ids of the events that explain them.
@@ -14,20 +20,20 @@ pub(crate) fn explain(
     elements: &Elements,
     log: &EventLog,
 ) -> Vec<(Vec<Change>, Vec<EventId>)> {
-    let turns = EventTurns::new(log, elements);
+    let times = EventTimes::new(log, elements);
     let spans = graphs.spans();
-    let mut differ = vec![Turned::default(); spans.len()];
+    let mut differ = vec![Differing::default(); spans.len()];
     for what in elements.all() {
-        for (at, exists) in graphs.turns(what) {
-            let Turned { added, removed } = &mut differ[at];
+        for (at, exists) in graphs.presence_changes(what) {
+            let Differing { added, removed } = &mut differ[at];
             if exists { added } else { removed }.push(what);
         }
     }
-    let window = |(at, differ): (usize, &Turned)| {
+    let window = |(at, differ): (usize, &Differing)| {
         let mut list = Vec::new();
         if let Some(old) = at.checked_sub(1).map(|old| spans[old]) {
             let span = spans[at];
-            structure(differ, span, elements, &turns, &mut list);
+            structure(differ, span, elements, &times, &mut list);
             let added = Span::new(old.end.max(span.start), span.end);
             list.extend(values(log, added));
         }
@@ -38,20 +44,20 @@ pub(crate) fn explain(
 
 /// The elements that only this window has, and those that only the previous one has.
 #[derive(Clone, Default)]
-struct Turned {
+struct Differing {
     added: Vec<Element>,
     removed: Vec<Element>,
 }
 
 /// The times at which elements begin or end according to events, sorted.
-struct EventTurns {
+struct EventTimes {
     begins: BTreeMap<Element, Vec<(Stamp, EventId)>>,
     ends: BTreeMap<Element, Vec<(Stamp, EventId)>>,
     /// Unnamed publishers and their publications, with their topics: they appear and vanish with the topic.
     unnamed: BTreeMap<Element, Element>,
 }
 
-impl EventTurns {
+impl EventTimes {
     fn new(log: &EventLog, elements: &Elements) -> Self {
         let (mut begins, mut ends) = (BTreeMap::new(), BTreeMap::new());
         let add = |to: &mut BTreeMap<Element, Vec<_>>, what, time, id| {
@@ -107,21 +113,21 @@ fn unnamed(elements: &Elements) -> BTreeMap<Element, Element> {
 }
 
 fn structure(
-    differ: &Turned,
+    differ: &Differing,
     span: Span,
     elements: &Elements,
-    turns: &EventTurns,
+    times: &EventTimes,
     list: &mut Vec<(Change, EventId)>,
 ) {
     for what in differ.added.iter().copied() {
         let time = elements.seen(what).first.filter(|t| span.contains(*t));
-        if let Some((at, id)) = turns.find(&turns.begins, what, span.end) {
+        if let Some((at, id)) = times.find(&times.begins, what, span.end) {
             let time = time.or(Some(at).filter(|at| span.contains(*at)));
             list.push((Change::Added { what, time }, id));
         }
     }
     for what in differ.removed.iter().copied() {
-        if let Some((at, id)) = turns.find(&turns.ends, what, span.end) {
+        if let Some((at, id)) = times.find(&times.ends, what, span.end) {
             let time = Some(at).filter(|at| *at < span.end);
             list.push((Change::Removed { what, time }, id));
         }
@@ -131,11 +137,8 @@ fn structure(
 /// The changes of a window in events that are not about existence: rates, hand-overs, restarts, values.
 fn values(log: &EventLog, added: Span) -> impl Iterator<Item = (Change, EventId)> + '_ {
     let inside = log.events.with_ids().filter(move |(_, e)| {
-        added.contains(
-            e.until
-                .filter(|_| e.kind == Kind::Restarted)
-                .unwrap_or(e.time),
-        )
+        let back = e.until.filter(|_| e.kind == Kind::Restarted);
+        added.contains(back.unwrap_or(e.time))
     });
     inside.filter_map(|(id, event)| Some((change(event)?, id)))
 }
@@ -160,11 +163,7 @@ fn change(event: &Event) -> Option<Change> {
             _ => None,
         },
         (Detail::Values { from, to }, kind) => Some(Change::Value {
-            kind: match kind {
-                Kind::Type => ValueKind::Type,
-                Kind::Qos => ValueKind::Qos,
-                _ => ValueKind::Lifecycle,
-            },
+            kind: ValueKind::from_word(kind.word()).unwrap_or(ValueKind::Lifecycle),
             what,
             from: from.clone(),
             to: to.clone(),
@@ -202,4 +201,205 @@ pub(crate) fn places(log: &EventLog, windows: &[Window]) -> Vec<Vec<EventId>> {
             .collect()
     };
     windows.iter().map(of_window).collect()
+}
+
+// The log of a mission with known windows only: each change belongs to its window.
+
+/// The log from the changes between windows. A change without a time inside its window is put at the window's start.
+pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> EventLog {
+    let mut events = ById::default();
+    for window in windows {
+        let offset = events.len();
+        let owners = WindowChanges::new(elements, window);
+        let changes = window.changes.iter().enumerate();
+        let all: ById<EventId, Event> = changes.map(|(at, one)| owners.event(at, one)).collect();
+        for event in &all {
+            let whole = event.part_of.map(|id| whole(&all, id));
+            let part_of = whole.map(|id| EventId::of(offset + id.at()));
+            events.push(Event {
+                part_of,
+                ..event.clone()
+            });
+        }
+    }
+    EventLog {
+        events: sorted_by(events, |event| event.what).0,
+        ..EventLog::default()
+    }
+}
+
+/// The outermost event that explains this one: parts have no parts.
+fn whole(events: &ById<EventId, Event>, mut id: EventId) -> EventId {
+    // A topic may belong to a publication, and that to a node or a hand-over.
+    for _ in 0..3 {
+        id = events[id].part_of.unwrap_or(id);
+    }
+    id
+}
+
+/// The elements that appeared or vanished in one window, and their relations.
+struct WindowChanges<'a> {
+    elements: &'a Elements,
+    window: &'a Window,
+    /// The elements that appeared, with the indices of their changes; `went` has those that vanished.
+    came: BTreeMap<Element, usize>,
+    went: BTreeMap<Element, usize>,
+    restarted: BTreeMap<NodeId, usize>,
+    handed: BTreeMap<TopicId, usize>,
+    /// The publications that appeared or vanished, per topic.
+    senders: BTreeMap<TopicId, Vec<(Element, NodeId)>>,
+}
+
+impl<'a> WindowChanges<'a> {
+    fn new(elements: &'a Elements, window: &'a Window) -> Self {
+        let mut owners = Self {
+            elements,
+            window,
+            came: BTreeMap::new(),
+            went: BTreeMap::new(),
+            restarted: BTreeMap::new(),
+            handed: BTreeMap::new(),
+            senders: BTreeMap::new(),
+        };
+        for (at, change) in window.changes.iter().enumerate() {
+            match change {
+                Change::Added { what, .. } => owners.came.insert(*what, at),
+                Change::Removed { what, .. } => owners.went.insert(*what, at),
+                Change::Restarted { node, .. } => owners.restarted.insert(*node, at),
+                Change::HandedOver { topic, .. } => owners.handed.insert(*topic, at),
+                Change::Rate { .. } | Change::Value { .. } => None,
+            };
+            if let Change::Added { what, .. } | Change::Removed { what, .. } = change
+                && let (Element::Publish(_), Some((node, topic))) = (what, owners.edge(*what))
+            {
+                let all = owners.senders.entry(topic).or_default();
+                all.push((*what, node));
+            }
+        }
+        owners
+    }
+
+    fn edge(&self, what: Element) -> Option<(NodeId, TopicId)> {
+        let (node, topic) = self.elements.ends(what);
+        node.zip(topic)
+    }
+
+    fn event(&self, at: usize, change: &Change) -> Event {
+        let (kind, what, time, detail) = described(change);
+        let Span { start, end } = self.window.span;
+        // The last sign of a node is not its end.
+        let time = time.filter(|_| !matches!(change, Change::Removed { .. }));
+        let time = time.filter(|t| self.window.span.contains(*t));
+        let bound = Bound {
+            time: time.unwrap_or(start),
+            earliest: start,
+            latest: end,
+        };
+        let whole = self.whole(change).filter(|whole| *whole != at);
+        Event {
+            detail,
+            part_of: whole.map(EventId::of),
+            ..Event::new(kind, what, bound)
+        }
+    }
+
+    /// The index of the change that explains this one, if any.
+    fn whole(&self, change: &Change) -> Option<usize> {
+        match change {
+            Change::Added { what, .. } => self.mover(*what, &self.came),
+            Change::Removed { what, .. } => self.mover(*what, &self.went),
+            Change::Rate { what, .. } => self.sender(*what),
+            Change::HandedOver { .. } | Change::Restarted { .. } | Change::Value { .. } => None,
+        }
+    }
+
+    /// The place of the change that explains an added or removed element: a node its edges and topics, a hand-over its
+    /// publications.
+    fn mover(&self, what: Element, moved: &BTreeMap<Element, usize>) -> Option<usize> {
+        match what {
+            Element::Node(_) => None,
+            Element::Publish(_) | Element::Subscribe(_) => {
+                let (node, topic) = self.edge(what)?;
+                let cause = moved.get(&Element::Node(node));
+                let cause = cause.or_else(|| self.handed.get(&topic));
+                let cause = cause.or_else(|| self.restarted.get(&node)).copied();
+                let is_subscribed = matches!(what, Element::Subscribe(_));
+                let has_moved = is_subscribed && moved.contains_key(&Element::Topic(topic));
+                cause.or_else(|| has_moved.then(|| self.topic_mover(topic, moved)).flatten())
+            }
+            Element::Topic(topic) => self.topic_mover(topic, moved),
+        }
+    }
+
+    /// The index of the change of the node with which a topic appeared or vanished, else of the publication.
+    fn topic_mover(&self, topic: TopicId, moved: &BTreeMap<Element, usize>) -> Option<usize> {
+        let senders = self.senders.get(&topic).into_iter().flatten();
+        let mut senders = senders.filter(|(edge, _)| moved.contains_key(edge));
+        if let Some((edge, node)) = senders.next() {
+            let node = moved.get(&Element::Node(*node));
+            return node.or_else(|| moved.get(edge)).copied();
+        }
+        let listeners = moved.keys().filter_map(|what| match what {
+            Element::Subscribe(_) => self.edge(*what).filter(|edge| edge.1 == topic),
+            _ => None,
+        });
+        let nodes = listeners.filter_map(|edge| moved.get(&Element::Node(edge.0)));
+        nodes.copied().next()
+    }
+
+    /// The index of the change that explains a rate change: a publisher that started, stopped or restarted, or other
+    /// publishers.
+    fn sender(&self, what: Element) -> Option<usize> {
+        let topic = match what {
+            Element::Topic(topic) => topic,
+            _ => self.edge(what)?.1,
+        };
+        let again = |edge: &Edge| {
+            let restarted = self.restarted.get(&edge.node);
+            restarted.filter(|_| edge.topic == topic)
+        };
+        let other = self.handed.get(&topic);
+        if let Some(at) = other.or_else(|| self.elements.publishes.iter().find_map(again)) {
+            return Some(*at);
+        }
+        let (edge, node) = self.senders.get(&topic)?.first()?;
+        let has_come = self.came.contains_key(edge);
+        let moved = if has_come { &self.came } else { &self.went };
+        let node = moved.get(&Element::Node(*node));
+        node.or_else(|| moved.get(edge)).copied()
+    }
+}
+
+/// The event for a change: its element, its time if known, and its values.
+pub(crate) fn described(change: &Change) -> (Kind, Element, Option<Stamp>, Detail) {
+    match change.clone() {
+        Change::Added { what, time } if what.is_node() => (Kind::Started, what, time, Detail::None),
+        Change::Added { what, time } => (Kind::Appeared, what, time, Detail::None),
+        Change::Removed { what, time } if what.is_node() => {
+            (Kind::Stopped, what, time, Detail::None)
+        }
+        Change::Removed { what, time } => (Kind::Vanished, what, time, Detail::None),
+        Change::Rate {
+            what,
+            from_hz,
+            to_hz,
+        } => (Kind::Rate, what, None, Detail::Rates { from_hz, to_hz }),
+        Change::HandedOver { topic, from, to } => {
+            let detail = Detail::Senders { from, to };
+            (Kind::HandedOver, Element::Topic(topic), None, detail)
+        }
+        Change::Restarted { node, time } => {
+            let node = Element::Node(node);
+            (Kind::Restarted, node, Some(time), Detail::None)
+        }
+        Change::Value {
+            kind,
+            what,
+            from,
+            to,
+        } => {
+            let kind = Kind::from_word(kind.word()).unwrap_or(Kind::Lifecycle);
+            (kind, what, None, Detail::Values { from, to })
+        }
+    }
 }

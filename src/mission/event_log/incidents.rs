@@ -1,13 +1,19 @@
-//! Remarks about elements: subscribers that receive nothing, duplicate names, messages that the recorder lost, which
-//! explain silences, and the input switches of a mux.
+//! Statements that are events as they are: subscribers that receive nothing, duplicate names, messages that the recorder lost,
+//! which explain silences, the input switches of a mux, and lifecycle states.
+//!
+//! For example, the recorder reports at 31 s that it lost 80 messages of `/scan`, which was silent from 28 s to 30 s: that silence
+//! is a part of the loss.
 
-use super::make::{Drafts, LogInput, exact};
-use super::{Detail, EventId, Kind};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::drafts::{Drafts, LogInput, exact};
+use super::{Detail, Event, EventId, Kind};
 use crate::base::rhythm::CLOSE_NS;
 use crate::base::time::Stamp;
-use crate::evidence::Confidence;
 use crate::evidence::inference::IncidentKind;
 use crate::evidence::observation::Name;
+use crate::evidence::{Confidence, Evidence};
 use crate::graph::{Element, NodeId};
 
 /// Adds all of them.
@@ -20,7 +26,7 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
             }
             IncidentKind::Duplicate => (Kind::Duplicate, Detail::None),
             IncidentKind::Lost(many) => (Kind::Lost, Detail::Count(*many)),
-            IncidentKind::Turn(from, to) => {
+            IncidentKind::Switch(from, to) => {
                 let [from, to] = [from, to].map(|topic| publishers(context, *topic));
                 if from.is_empty() || to.is_empty() || from == to {
                     continue;
@@ -28,18 +34,37 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
                 (Kind::HandedOver, Detail::Senders { from, to })
             }
         };
-        let mut event = context.event(kind, incident.what, exact(incident.time));
-        event.until = incident.until;
-        event.detail = detail;
-        event.confidence = match kind {
-            Kind::HandedOver => Confidence::Inferred,
-            _ => Confidence::Stated,
-        };
-        event.evidence = incident.evidence;
-        let id = drafts.add(event);
+        let id = drafts.add(Event {
+            until: incident.until,
+            detail,
+            confidence: match kind {
+                Kind::HandedOver => Confidence::Inferred,
+                _ => Confidence::Stated,
+            },
+            evidence: incident.evidence,
+            ..context.event(kind, incident.what, exact(incident.time))
+        });
         if kind == Kind::Lost {
             let until = incident.until.unwrap_or(incident.time);
             explain(drafts, id, incident.what, (incident.time, until));
+        }
+    }
+}
+
+/// Adds the changes of nodes' lifecycle states.
+pub(super) fn add_lifecycles(context: &LogInput<'_>, drafts: &mut Drafts) {
+    let mut states: BTreeMap<NodeId, Arc<str>> = BTreeMap::new();
+    for change in &context.history.transitions {
+        let before = states.insert(change.node, change.state.clone());
+        let (from, to) = (before.unwrap_or_default(), change.state.clone());
+        if from != to {
+            let what = Element::Node(change.node);
+            drafts.add(Event {
+                confidence: Confidence::Stated,
+                evidence: Evidence::of("lifecycle"),
+                detail: Detail::Values { from, to },
+                ..context.event(Kind::Lifecycle, what, exact(change.time))
+            });
         }
     }
 }

@@ -1,6 +1,9 @@
 //! Rate changes: between two adjacent even stretches of one sender.
+//!
+//! For example, `/camera` sends `/image` at 30 Hz for 20 s and then at 5 Hz for 10 s: a change of its rate at the first message of
+//! the second stretch. At 5 Hz for 2 s it would be none, and none after a pause in which `/camera` restarted.
 
-use super::make::{Drafts, LogInput};
+use super::drafts::{Drafts, LogInput};
 use super::{Detail, Kind};
 use crate::base::rhythm::{FEWEST_OF_RATE, RATE_HOLDS_NS, RATE_PAUSE_NS};
 use crate::graph::Element;
@@ -11,27 +14,24 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     let senders = context.history.sending.senders.iter();
     for sender in senders.filter(|v| !v.is_latched && !context.is_by_the_way(v.topic)) {
         for pair in sender.stretches.windows(2) {
-            let [before, after] = pair else { continue };
-            if changes(before, after, context.rate_change)
-                && !is_away(context, sender, before, after)
+            let (before, after) = (&pair[0], &pair[1]);
+            if !changes(before, after, context.rate_change)
+                || is_away(context, sender, before, after)
             {
-                let what = context.publication(sender);
-                let width = before.period.max(after.period);
-                let mut event = context.event(
-                    Kind::Rate,
-                    what,
-                    Bound {
-                        time: after.first,
-                        earliest: before.last.min(after.first.plus(-width)),
-                        latest: after.first.plus(width),
-                    },
-                );
-                event.detail = Detail::Rates {
-                    from_hz: before.hz(),
-                    to_hz: after.hz(),
-                };
-                drafts.add(event);
+                continue;
             }
+            let width = before.period.max(after.period);
+            let at = Bound {
+                time: after.first,
+                earliest: before.last.min(after.first.plus(-width)),
+                latest: after.first.plus(width),
+            };
+            let mut event = context.event(Kind::Rate, context.publication(sender), at);
+            event.detail = Detail::Rates {
+                from_hz: before.hz(),
+                to_hz: after.hz(),
+            };
+            drafts.add(event);
         }
     }
 }

@@ -1,16 +1,16 @@
 //! Silences without proof of an end: of nodes, and of topics whose senders all paused.
+//!
+//! For example, `/camera` sends `/image` at 30 Hz, pauses from 20 s to 25 s and goes on with its numbers: `/camera` was silent for
+//! 5 s, and the silence of `/image` is a part of that. If `/camera` ended at 20 s, the silence is a part of its end.
 
 use std::collections::BTreeMap;
 
-use super::make::{Drafts, LogInput};
+use super::drafts::{Drafts, LogInput};
 use super::{EventId, Kind};
 use crate::base::rhythm::TOGETHER_NS;
 use crate::base::time::Stamp;
-use crate::graph::history::{Bound, Sender};
+use crate::graph::history::{Bound, Sender, Silence};
 use crate::graph::{Element, NodeId, Record};
-
-/// The beginning and end of a silence; `None` if to the end of the mission.
-type Silence = (Stamp, Option<Stamp>);
 
 /// Adds all silences.
 pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
@@ -79,11 +79,8 @@ fn by<'a, I: Ord>(
 
 /// The silences of an element.
 fn silences<'a>(context: &LogInput<'a>, what: Element) -> &'a [Silence] {
-    context
-        .history
-        .records
-        .of(what)
-        .map_or(&[], Record::silences)
+    let record = context.history.records.of(what);
+    record.map_or(&[], Record::silences)
 }
 
 fn event(
@@ -92,22 +89,18 @@ fn event(
     (from, to): Silence,
     senders: &[&Sender],
 ) -> super::Event {
-    let last = senders
-        .iter()
-        .flat_map(|v| &v.stretches)
-        .filter(|s| s.last == from);
+    let stretches = senders.iter().flat_map(|v| &v.stretches);
+    let last = stretches.filter(|s| s.last == from);
     let period = last.map(|s| s.period).max().unwrap_or(0);
-    let mut event = context.event(
-        Kind::Silent,
-        what,
-        Bound {
-            time: from,
-            earliest: from,
-            latest: from.plus(period),
-        },
-    );
-    event.until = to;
-    event
+    let at = Bound {
+        time: from,
+        earliest: from,
+        latest: from.plus(period),
+    };
+    super::Event {
+        until: to,
+        ..context.event(Kind::Silent, what, at)
+    }
 }
 
 /// Whether two silences overlap.

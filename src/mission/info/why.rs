@@ -141,7 +141,7 @@ fn describe(
     )
 }
 
-/// The largest number of similar names that are offered.
+/// The largest number of similar names that are offered: a hint is one line.
 const OFFERED: usize = 5;
 
 fn unknown(mission: &Mission, names: &[String]) -> Error {

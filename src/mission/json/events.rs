@@ -1,12 +1,15 @@
-//! The log's events as JSON, written and read back.
+//! The log's events in JSON, written and read back, and the changes from window to window that they explain.
 
 use serde::{Deserialize, Serialize};
 
-use super::elements::{Text, confidence_of, evidence, words};
+use super::{Text, text};
 use crate::base::time::{Span, Stamp};
+use crate::evidence::{Confidence, Evidence};
+use crate::graph::diff::Change;
 use crate::graph::{ById, Element, Elements, NodeId};
 use crate::mission::event_log::{
-    Detail, Event, EventId, EventLog, Interruption, InterruptionKind, Kind, Phase, sorted,
+    Detail, Event, EventId, EventLog, Interruption, InterruptionKind, Kind, Phase, described,
+    sorted,
 };
 
 /// An element by its name, or an edge by its two names.
@@ -57,16 +60,16 @@ pub(crate) struct EventJson<'a> {
     named: ElementName<'a>,
     #[serde(skip_serializing_if = "Option::is_none")]
     role: Option<Text<'a>>,
-    time_ns: i64,
-    earliest_ns: Option<i64>,
-    latest_ns: Option<i64>,
+    time_ns: Stamp,
+    earliest_ns: Option<Stamp>,
+    latest_ns: Option<Stamp>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    until_ns: Option<i64>,
+    until_ns: Option<Stamp>,
     #[serde(flatten)]
     detail: DetailJson<'a>,
     degree: Option<Text<'a>>,
     #[serde(default)]
-    evidence: Vec<Text<'a>>,
+    evidence: Evidence,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     parts: Vec<EventId>,
     /// The event that this one follows from: the one that lists it among its parts.
@@ -156,14 +159,17 @@ pub(crate) fn events<'a>(
         id,
         kind: event.kind.word().into(),
         named: ElementName::new(event.what, elements),
-        role: role(event.what, elements).map(Text::from),
-        time_ns: event.time.0,
-        earliest_ns: Some(event.earliest.0),
-        latest_ns: Some(event.latest.0),
-        until_ns: event.until.map(|t| t.0),
+        role: elements
+            .ends(event.what)
+            .0
+            .map(|id| (&*elements.nodes[id].role).into()),
+        time_ns: event.time,
+        earliest_ns: Some(event.earliest),
+        latest_ns: Some(event.latest),
+        until_ns: event.until,
         detail: DetailJson::new(&event.detail, elements),
         degree: Some(event.confidence.word().into()),
-        evidence: words(event.evidence),
+        evidence: event.evidence,
         parts: parts.get(&id).cloned().unwrap_or_default(),
         cause: event.part_of,
         quiet: event.quiet,
@@ -172,27 +178,18 @@ pub(crate) fn events<'a>(
 }
 
 /// Every event of a log as an object on one line.
-pub(crate) fn rows<'a>(
+pub(crate) fn event_rows<'a>(
     log: &'a EventLog,
     elements: &'a Elements,
 ) -> impl Iterator<Item = String> + 'a {
-    // Only maps with non-string keys fail, and there are none.
-    events(log, elements).map(|row| serde_json::to_string(&row).unwrap_or_default())
-}
-
-/// A text in quotes.
-pub(crate) fn text(text: &str) -> String {
-    serde_json::to_string(text).unwrap_or_default()
-}
-
-/// The role of the node that an event is about.
-fn role(what: Element, elements: &Elements) -> Option<&str> {
-    let (node, _) = elements.ends(what);
-    node.map(|id| &*elements.nodes[id].role)
+    events(log, elements).map(|row| text(&row))
 }
 
 /// The log of rows that were read; `None` if one of them is about an element that is not in any window.
-pub(crate) fn read(rows: &[EventJson<'_>], elements: &Elements) -> Option<ById<EventId, Event>> {
+pub(crate) fn events_of(
+    rows: &[EventJson<'_>],
+    elements: &Elements,
+) -> Option<ById<EventId, Event>> {
     let events = rows.iter().map(|row| row.event(elements));
     let mut list = events.collect::<Option<ById<_, _>>>()?;
     for (id, row) in list.ids().zip(rows) {
@@ -208,13 +205,15 @@ impl EventJson<'_> {
         Some(Event {
             kind: Kind::from_word(&self.kind)?,
             what: self.named.element(elements)?,
-            time: Stamp(self.time_ns),
-            earliest: Stamp(self.earliest_ns.unwrap_or(self.time_ns)),
-            latest: Stamp(self.latest_ns.unwrap_or(self.time_ns)),
-            until: self.until_ns.map(Stamp),
+            time: self.time_ns,
+            earliest: self.earliest_ns.unwrap_or(self.time_ns),
+            latest: self.latest_ns.unwrap_or(self.time_ns),
+            until: self.until_ns,
             detail: self.detail.detail(elements)?,
-            confidence: confidence_of(self.degree.as_deref()),
-            evidence: evidence(&self.evidence),
+            confidence: (self.degree.as_deref())
+                .and_then(Confidence::from_word)
+                .unwrap_or(Confidence::Stated),
+            evidence: self.evidence,
             part_of: None,
             quiet: self.quiet,
             weight: self.weight.unwrap_or(1),
@@ -224,11 +223,11 @@ impl EventJson<'_> {
 
 /// A phase in the form for writing and reading.
 #[derive(Deserialize, Serialize)]
-pub(crate) struct PhaseRow {
-    start_ns: i64,
-    end_ns: i64,
+pub(crate) struct PhaseRow<'a> {
+    start_ns: Stamp,
+    end_ns: Stamp,
     #[serde(default)]
-    name: String,
+    name: Text<'a>,
     #[serde(default)]
     nodes_added: u32,
     #[serde(default)]
@@ -239,44 +238,12 @@ pub(crate) struct PhaseRow {
     same_as: Option<u32>,
 }
 
-/// An interruption of the recording in the form for writing and reading.
-#[derive(Deserialize, Serialize)]
-pub(crate) struct InterruptionRow {
-    time_ns: i64,
-    kind: String,
-    length_ns: i64,
-}
-
-impl From<&Interruption> for InterruptionRow {
-    fn from(one: &Interruption) -> Self {
+impl<'a> From<&'a Phase> for PhaseRow<'a> {
+    fn from(phase: &'a Phase) -> Self {
         Self {
-            time_ns: one.time.0,
-            kind: one.kind.word().to_owned(),
-            length_ns: one.length,
-        }
-    }
-}
-
-/// The interruptions of rows that were read, without those of unknown kinds.
-pub(crate) fn interruptions(rows: &[InterruptionRow]) -> Vec<Interruption> {
-    let one = |row: &InterruptionRow| {
-        Some(Interruption {
-            time: Stamp(row.time_ns),
-            kind: InterruptionKind::from_word(&row.kind)?,
-            length: row.length_ns.max(0),
-        })
-    };
-    let mut all: Vec<Interruption> = rows.iter().filter_map(one).collect();
-    all.sort_unstable();
-    all
-}
-
-impl From<&Phase> for PhaseRow {
-    fn from(phase: &Phase) -> Self {
-        Self {
-            start_ns: phase.span.start.0,
-            end_ns: phase.span.end.0,
-            name: phase.name.to_string(),
+            start_ns: phase.span.start,
+            end_ns: phase.span.end,
+            name: (&*phase.name).into(),
             nodes_added: phase.nodes_added,
             nodes_removed: phase.nodes_removed,
             ramp: phase.is_ramp,
@@ -286,9 +253,9 @@ impl From<&Phase> for PhaseRow {
 }
 
 /// The phases of rows that were read; a reference to a later phase as the same one is dropped.
-pub(crate) fn phases(rows: Vec<PhaseRow>) -> Vec<Phase> {
-    let phase = |(at, row): (u32, PhaseRow)| Phase {
-        span: Span::new(Stamp(row.start_ns), Stamp(row.end_ns.max(row.start_ns))),
+pub(crate) fn phases(rows: Vec<PhaseRow<'_>>) -> Vec<Phase> {
+    let phase = |(at, row): (u32, PhaseRow<'_>)| Phase {
+        span: Span::from([row.start_ns, row.end_ns]),
         name: row.name.into(),
         nodes_added: row.nodes_added,
         nodes_removed: row.nodes_removed,
@@ -296,4 +263,74 @@ pub(crate) fn phases(rows: Vec<PhaseRow>) -> Vec<Phase> {
         same_as: row.same_as.filter(|earlier| *earlier < at),
     };
     (0..).zip(rows).map(phase).collect()
+}
+
+/// An interruption of the recording in the form for writing and reading.
+#[derive(Deserialize, Serialize)]
+pub(crate) struct InterruptionRow<'a> {
+    time_ns: Stamp,
+    kind: Text<'a>,
+    length_ns: i64,
+}
+
+impl From<&Interruption> for InterruptionRow<'_> {
+    fn from(one: &Interruption) -> Self {
+        Self {
+            time_ns: one.time,
+            kind: one.kind.word().into(),
+            length_ns: one.length,
+        }
+    }
+}
+
+/// The interruptions of rows that were read, without those of unknown kinds.
+pub(crate) fn interruptions(rows: &[InterruptionRow<'_>]) -> Vec<Interruption> {
+    let one = |row: &InterruptionRow<'_>| {
+        Some(Interruption {
+            time: row.time_ns,
+            kind: InterruptionKind::from_word(&row.kind)?,
+            length: row.length_ns.max(0),
+        })
+    };
+    let mut all: Vec<Interruption> = rows.iter().filter_map(one).collect();
+    all.sort_unstable();
+    all
+}
+
+// The changes from window to window, which are written only.
+
+#[derive(Serialize)]
+pub(crate) struct ChangeRow<'a> {
+    kind: &'static str,
+    #[serde(rename = "entry")]
+    event: EventId,
+    #[serde(flatten)]
+    named: ElementName<'a>,
+    #[serde(flatten)]
+    values: ChangeValues<'a>,
+}
+
+#[derive(Serialize)]
+#[serde(untagged)]
+enum ChangeValues<'a> {
+    /// The time at which the element appeared, vanished or restarted, if known.
+    Time {
+        time_ns: Option<Stamp>,
+    },
+    Other(DetailJson<'a>),
+}
+
+impl<'a> ChangeRow<'a> {
+    pub(crate) fn new(change: &Change, event: EventId, elements: &'a Elements) -> Self {
+        let (_, what, time_ns, detail) = described(change);
+        Self {
+            kind: change.word(),
+            event,
+            named: ElementName::new(what, elements),
+            values: match &detail {
+                Detail::None => ChangeValues::Time { time_ns },
+                detail => ChangeValues::Other(DetailJson::new(detail, elements)),
+            },
+        }
+    }
 }

@@ -7,16 +7,51 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::elements::{EdgeJson, ElementJson, NodeJson, Text, TopicJson};
-use super::raw::{BagJson, NoticeJson, Raw, RawWindow};
-use super::sending::sending;
-use super::write::SCHEMA;
+use serde::Deserialize;
+
+use super::elements::{EdgeJson, ElementJson, NodeJson, TopicJson};
+use super::events::{EventJson, InterruptionRow, PhaseRow, events_of, interruptions, phases};
+use super::write::{BagJson, NoticeJson};
+use super::{SCHEMA, Text};
 use crate::bag::{Report, Tier};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::{Period, Span, Stamp};
-use crate::graph::{ColumnWriter, Elements, Graphs, GraphsWriter};
-use crate::mission::{Mission, Window};
+use crate::graph::history::{Sender, Sending, Stretch};
+use crate::graph::{ById, ColumnWriter, Elements, Graphs, GraphsWriter, NodeId, TopicId};
+use crate::mission::{EventLog, Mission, Places, Window};
+
+/// The keys of a mission; all are optional except names, windows and times.
+#[derive(Deserialize)]
+struct Raw {
+    schema: String,
+    #[serde(default)]
+    bags: Vec<BagJson<'static>>,
+    start_ns: Option<Stamp>,
+    end_ns: Option<Stamp>,
+    messages: Option<u64>,
+    period_ns: Option<i64>,
+    step_ns: Option<i64>,
+    windows: Vec<RawWindow>,
+    #[serde(default)]
+    elements: Vec<ElementJson<'static>>,
+    events: Option<Vec<EventJson<'static>>>,
+    #[serde(default)]
+    interruptions: Vec<InterruptionRow<'static>>,
+    #[serde(default)]
+    phases: Vec<PhaseRow<'static>>,
+    layout: Option<Places>,
+    #[serde(default)]
+    notices: Vec<NoticeJson<'static>>,
+}
+
+#[derive(Deserialize)]
+struct RawWindow {
+    start_ns: Stamp,
+    end_ns: Stamp,
+    partial: Option<bool>,
+    messages: Option<u64>,
+}
 
 /// Reads a mission in JSON; `path` is only used in errors.
 ///
@@ -60,33 +95,31 @@ fn mission_of(mut raw: Raw) -> Result<Mission, String> {
         events: Vec::new(),
     });
     let windows: Vec<Window> = windows.collect();
-    let sum = |windows: &[Window]| {
-        let messages = windows.iter().map(|w| w.messages);
-        messages.fold(0, u64::saturating_add)
-    };
+    let messages = windows.iter().map(|w| w.messages);
+    let messages = messages.fold(0, u64::saturating_add);
     let mut mission = Mission {
         bags: raw.bags.into_iter().map(report).collect(),
         span: Span::new(
-            raw.start_ns.map_or(start, Stamp).min(start),
-            raw.end_ns.map_or(end, Stamp).max(end),
+            raw.start_ns.unwrap_or(start).min(start),
+            raw.end_ns.unwrap_or(end).max(end),
         ),
-        messages: raw.messages.unwrap_or_else(|| sum(&windows)),
+        messages: raw.messages.unwrap_or(messages),
         period,
         step: raw.step_ns.and_then(Period::from_nanos).unwrap_or(period),
-        sending: sending(listed.topics.values(), listed.publishes.values(), &elements)?,
+        sending: listed.sending(&elements)?,
         graphs: listed.graphs(&elements, spans),
         elements,
         windows,
-        log: crate::mission::EventLog::default(),
+        log: EventLog::default(),
         undrawn: Vec::new(),
         layout: raw.layout,
         notices: notices(raw.notices),
     };
     if let Some(rows) = raw.events {
-        let events = super::events::read(&rows, &mission.elements);
+        let events = events_of(&rows, &mission.elements);
         mission.log.events = events.ok_or("an event refers to an element that is not listed")?;
-        mission.log.phases = super::events::phases(raw.phases);
-        mission.log.interruptions = super::events::interruptions(&raw.interruptions);
+        mission.log.phases = phases(raw.phases);
+        mission.log.interruptions = interruptions(&raw.interruptions);
         mission.explain();
     }
     Ok(mission)
@@ -97,7 +130,7 @@ fn spans(windows: &[RawWindow]) -> Result<Vec<Span>, String> {
     if windows.is_empty() {
         return Err("it has no windows".to_owned());
     }
-    let span = |w: &RawWindow| Span::new(Stamp(w.start_ns), Stamp(w.end_ns));
+    let span = |w: &RawWindow| Span::new(w.start_ns, w.end_ns);
     let spans: Vec<Span> = windows.iter().map(span).collect();
     for (index, span) in spans.iter().enumerate() {
         if span.start >= span.end {
@@ -166,6 +199,45 @@ impl Listed {
         all.subscribes = edges.collect::<Result<_, _>>()?;
         all.publishes = publishes;
         Ok(all)
+    }
+
+    /// The messages of all senders.
+    ///
+    /// # Errors
+    /// The mistake in the stretches.
+    fn sending(&self, elements: &Elements) -> Result<Sending, String> {
+        let topics = || self.topics.values();
+        let unnamed = topics().map(|one| (&one.name, None, &one.sender));
+        let named = self.publishes.values();
+        let named = named.map(|one| (&one.topic, Some(&one.node), &one.sender));
+        let mut all: BTreeMap<(TopicId, Option<NodeId>), Sender> = BTreeMap::new();
+        for (name, node, sender) in unnamed.chain(named) {
+            let Some(topic) = elements
+                .topic(name)
+                .filter(|_| !sender.stretches.is_empty())
+            else {
+                continue;
+            };
+            let is_whole = |s: &Stretch| s.first <= s.last && s.count > 0 && s.period >= 0;
+            let mut pairs = sender.stretches.windows(2);
+            let ascend = pairs.all(|pair| pair[0].last <= pair[1].first);
+            if !ascend || !sender.stretches.iter().all(is_whole) {
+                return Err(format!("the stretches of `{name}` do not ascend"));
+            }
+            let mut sender = sender.clone().into_owned();
+            sender.topic = topic;
+            sender.node = node.and_then(|name| elements.node(name));
+            all.insert((topic, sender.node), sender);
+        }
+        let mut pauses = ById::default();
+        if topics().any(|one| !one.pauses.is_empty()) {
+            // The topics are listed in the order of their ids.
+            pauses = topics().map(|one| one.pauses.clone()).collect();
+        }
+        Ok(Sending {
+            senders: all.into_values().collect(),
+            pauses,
+        })
     }
 
     /// The graphs of the windows by the elements' columns.

@@ -1,23 +1,20 @@
 //! Writes a mission as JSON, schema `bagreel.mission/3`, element by element without a second copy in memory.
 
+use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
 
-use serde::Serialize;
 use serde::ser::{SerializeMap as _, SerializeSeq as _, Serializer};
+use serde::{Deserialize, Serialize};
 
-use super::changes::ChangeRow;
-use super::elements::{EdgeJson, ElementJson, NodeJson, Text, TopicJson, pairs};
-use super::events::{InterruptionRow, PhaseRow, events};
+use super::columns::JsonColumns;
+use super::elements::{EdgeJson, ElementJson, NodeJson, TopicJson};
+use super::events::{ChangeRow, InterruptionRow, PhaseRow, events};
 use super::lines::LineFormatter;
-use super::raw::{BagJson, NoticeJson};
-use super::runs::JsonColumns;
-use super::sending::{SendingJson, senders};
+use super::{SCHEMA, Text};
 use crate::bag::Report;
-use crate::graph::Element;
+use crate::graph::history::Sender;
+use crate::graph::{Element, NodeId, TopicId};
 use crate::mission::{Mission, Places, Window};
-
-/// The schema that is written and read.
-pub(crate) const SCHEMA: &str = "bagreel.mission/3";
 
 /// Writes the whole mission as JSON, ending in a new line. Lists are sorted by name, times are nanoseconds since 1970,
 /// unknown values are `null`.
@@ -62,8 +59,8 @@ impl Serialize for Json<'_> {
         let mut map = serializer.serialize_map(None)?;
         map.serialize_entry("schema", SCHEMA)?;
         map.serialize_entry("bags", &List(mission.bags.iter().map(BagJson::new)))?;
-        map.serialize_entry("start_ns", &mission.span.start.0)?;
-        map.serialize_entry("end_ns", &mission.span.end.0)?;
+        map.serialize_entry("start_ns", &mission.span.start)?;
+        map.serialize_entry("end_ns", &mission.span.end)?;
         map.serialize_entry("messages", &mission.messages)?;
         map.serialize_entry("period_ns", &mission.period.nanos())?;
         map.serialize_entry("step_ns", &mission.step.nanos())?;
@@ -103,6 +100,19 @@ impl<I: Iterator<Item: Serialize> + Clone> Serialize for List<I> {
     }
 }
 
+#[derive(Default, Deserialize, Serialize)]
+#[serde(default)]
+pub(crate) struct BagJson<'a> {
+    pub(crate) name: Text<'a>,
+    pub(crate) format: Text<'a>,
+    pub(crate) compression: Vec<Text<'a>>,
+    pub(crate) tier: Text<'a>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) tier_reason: Option<Text<'a>>,
+    pub(crate) complete: Option<bool>,
+    pub(crate) file_bytes: u64,
+}
+
 impl<'a> BagJson<'a> {
     fn new(bag: &'a Report) -> Self {
         Self {
@@ -117,6 +127,14 @@ impl<'a> BagJson<'a> {
     }
 }
 
+#[derive(Default, Deserialize, Serialize)]
+#[serde(default)]
+pub(crate) struct NoticeJson<'a> {
+    pub(crate) kind: Text<'a>,
+    pub(crate) count: Option<u64>,
+    pub(crate) text: String,
+}
+
 /// A window with its changes.
 struct WindowOf<'a> {
     window: &'a Window,
@@ -128,8 +146,8 @@ impl Serialize for WindowOf<'_> {
         let window = self.window;
         let mut map = serializer.serialize_map(None)?;
         map.serialize_entry("index", &window.index)?;
-        map.serialize_entry("start_ns", &window.span.start.0)?;
-        map.serialize_entry("end_ns", &window.span.end.0)?;
+        map.serialize_entry("start_ns", &window.span.start)?;
+        map.serialize_entry("end_ns", &window.span.end)?;
         map.serialize_entry("length_ns", &window.span.nanos())?;
         map.serialize_entry("partial", &window.partial)?;
         map.serialize_entry("messages", &window.messages)?;
@@ -143,27 +161,29 @@ impl Serialize for WindowOf<'_> {
 
 /// All elements over the whole mission, with their windows as columns.
 fn elements(mission: &Mission) -> impl Iterator<Item = ElementJson<'_>> + Clone {
-    let (all, senders) = (&mission.elements, senders(&mission.sending));
+    let all = &mission.elements;
+    let senders = mission.sending.senders.iter();
+    // `None` means all unknown senders of a topic.
+    let senders: BTreeMap<(TopicId, Option<NodeId>), &Sender> =
+        senders.map(|one| ((one.topic, one.node), one)).collect();
     all.all().map(move |what| {
-        let sending = |topic, node| senders.get(&(topic, node)).copied().into();
+        let sender = |topic, node| senders.get(&(topic, node)).copied();
         let columns = JsonColumns::of(&mission.graphs, what);
         match what {
             Element::Node(id) => ElementJson::Node(NodeJson::new(&all.nodes[id], columns)),
             Element::Topic(id) => {
-                let pauses = mission.sending.pauses.get(id);
-                ElementJson::Topic(TopicJson {
-                    pauses: pauses.map_or_else(Vec::new, |spans| pairs(spans)),
-                    ..TopicJson::new(&all.topics[id], sending(id, None), columns)
-                })
+                let pauses = mission.sending.pauses.of(id).to_vec();
+                let topic = &all.topics[id];
+                ElementJson::Topic(TopicJson::new(topic, sender(id, None), pauses, columns))
             }
             Element::Publish(id) => {
                 let edge = &all.publishes[id];
-                let sending = sending(edge.topic, Some(edge.node));
-                ElementJson::Publish(EdgeJson::new(edge, all, sending, columns))
+                let sender = sender(edge.topic, Some(edge.node));
+                ElementJson::Publish(EdgeJson::new(edge, all, sender, columns))
             }
             Element::Subscribe(id) => {
-                let (edge, sending) = (&all.subscribes[id], SendingJson::default());
-                ElementJson::Subscribe(EdgeJson::new(edge, all, sending, columns))
+                let edge = &all.subscribes[id];
+                ElementJson::Subscribe(EdgeJson::new(edge, all, None, columns))
             }
         }
     })

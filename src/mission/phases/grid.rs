@@ -6,7 +6,7 @@ use crate::graph::window::every;
 /// The most cells: more would be finer than print, and the cost of phases grows with the square.
 const MOST_CELLS: i64 = 200;
 
-/// The shortest cell.
+/// The shortest cell, 1 s: recorders find topics once a second, so that shorter ones would be noise.
 const SECOND: i64 = 1_000_000_000;
 
 /// The cells that divide `span`: 1 s if possible, longer if there would be more than [`MOST_CELLS`].

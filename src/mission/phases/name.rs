@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::base::name::last_part;
 use crate::base::words::{count, some_of};
 
-/// The most names listed.
+/// The most names listed: with more, the name of a phase is longer than its band in a figure.
 const MOST: usize = 3;
 
 /// The name by the changes: `11 nodes`, `+4 nodes: controller, costmap, planner and 1 more`, `+4 −1 nodes: …`,

@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 /// number of elements. Tuned on three real missions and tested on three others (precision .98, recall .83 of
 /// 44 boundaries).
 const PRICE: i128 = 400;
-/// The least number of elements that is assumed for the cost.
+/// The least number of elements that is assumed for the cost: with three nodes, each restart of one would otherwise be a phase.
 const FEWEST: i128 = 10;
-/// The shortest phase, as a part of the mission (one in so many).
+/// The shortest phase, as a part of the mission (one in so many): shorter ones have no room for a name in a figure.
 const SHORTEST: i64 = 20;
 
 /// The cells, other than the first, at which pieces begin. `widths` are the cells' lengths in nanoseconds, `present`

@@ -9,7 +9,8 @@ use crate::graph::history::{Sending, Stretch, silences};
 use crate::graph::{Edge, Element, Elements, NodeId, TopicId};
 
 /// The longest absence, as a part of the mission (one in so many), that is ignored inside an element's lifetime: a slow
-/// topic has no message in some cells.
+/// topic has no message in some cells, of which there are at most 200. With a twentieth, a node that is away for a whole phase would be
+/// there.
 const FILLED: i64 = 50;
 
 /// An element whose presence is recorded.

@@ -3,9 +3,10 @@
 use super::Configuration;
 use crate::base::time::Span;
 
-/// The fewest phases of a ramp.
+/// The fewest phases of a ramp: fewer are told apart one by one, and a launch in three steps is not a fleet that joins.
 const FEWEST: usize = 5;
-/// The share of the mission, in hundredths, that each phase of a ramp must stay below.
+/// The share of the mission, in hundredths, that each phase of a ramp must stay below: five of them are less than half of it, and a
+/// phase may not be shorter than 5 anyway.
 const SHORT: i64 = 8;
 
 /// The effect of a phase on the one before it.

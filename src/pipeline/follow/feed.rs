@@ -11,7 +11,7 @@ use crate::base::words::worded;
 use crate::gate::{Severity, Verdict};
 use crate::mission::Mission;
 use crate::mission::event_log::{Detail, Event, InterruptionKind, Kind};
-use crate::mission::events::{LogFormat, LogLine, LogRow, headlines, quoted, row_lines};
+use crate::mission::event_log::{LogFormat, LogLine, LogRow, headlines, quoted, row_lines};
 
 worded! {
     /// The certainty of a line.

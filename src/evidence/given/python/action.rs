@@ -37,18 +37,16 @@ impl Evaluator<'_> {
             _ => tree(name, arguments)?,
         };
         tree.line = arguments.line;
-        if let Some(Action(condition)) = arguments.named("condition") {
-            tree.attributes.extend(condition.attributes.iter().cloned());
-        } else if arguments
-            .named("condition")
-            .is_some_and(|c| *c != PythonValue::None)
-        {
-            tree.attributes
-                .push(("if".to_owned(), "$(unknown)".to_owned()));
+        let unknown = || ("if".to_owned(), "$(unknown)".to_owned());
+        match arguments.named("condition") {
+            Some(Action(condition)) => {
+                tree.attributes.extend(condition.attributes.iter().cloned());
+            }
+            Some(PythonValue::None) | None => {}
+            Some(_) => tree.attributes.push(unknown()),
         }
         if self.undecided > 0 {
-            tree.attributes
-                .insert(0, ("if".to_owned(), "$(unknown)".to_owned()));
+            tree.attributes.insert(0, unknown());
         }
         Some(Action(tree))
     }
@@ -63,18 +61,19 @@ impl Evaluator<'_> {
         let Some(function) = function else {
             return element(UNREAD, &[]);
         };
-        let mut positional = vec![Unknown(arguments.line)];
+        let mut given = Arguments::default();
+        given.positional.push(Unknown(arguments.line));
         if let Some(List(more)) = arguments.named("args") {
-            positional.extend(more.iter().cloned());
+            given.positional.extend(more.iter().cloned());
         }
-        let named = match arguments.named("kwargs") {
-            Some(Dict(map)) => map.clone(),
-            _ => Vec::new(),
-        };
-        let made = self.call(function, &positional, &named);
-        let mut group = element("group", &[("scoped", Some("false".to_owned()))]);
-        group.children = trees(&made);
-        group
+        if let Some(Dict(map)) = arguments.named("kwargs") {
+            given.named.clone_from(map);
+        }
+        let made = self.call(function, &given);
+        Tree {
+            children: trees(&made),
+            ..unscoped()
+        }
     }
 }
 
@@ -88,9 +87,13 @@ fn tree(name: &str, given: &Arguments) -> Option<Tree> {
         "LoadComposableNodes" => element("load_composable_node", &[]),
         "IncludeLaunchDescription" => include(given),
         "GroupAction" => element("group", &[("scoped", text(9, "scoped"))]),
-        "TimerAction" | "RegisterEventHandler" => {
-            element("group", &[("scoped", Some("false".to_owned()))])
-        }
+        "TimerAction"
+        | "RegisterEventHandler"
+        | "OnProcessExit"
+        | "OnProcessStart"
+        | "OnProcessIO"
+        | "OnExecutionComplete"
+        | "OnStateTransition" => unscoped(),
         "PushRosNamespace" | "PushROSNamespace" => {
             element("push_ros_namespace", &[("namespace", text(0, "namespace"))])
         }
@@ -106,30 +109,15 @@ fn tree(name: &str, given: &Arguments) -> Option<Tree> {
                 ("default", text(1, "default_value")),
             ],
         ),
-        "OnProcessExit"
-        | "OnProcessStart"
-        | "OnProcessIO"
-        | "OnExecutionComplete"
-        | "OnStateTransition" => element("group", &[("scoped", Some("false".to_owned()))]),
         "IfCondition" => element("condition", &[("if", text(0, "predicate_expression"))]),
         "UnlessCondition" => element("condition", &[("unless", text(0, "predicate_expression"))]),
         "LaunchConfigurationEquals" | "LaunchConfigurationNotEquals" => {
-            let sign = if name == "LaunchConfigurationEquals" {
-                "=="
-            } else {
-                "!="
-            };
-            let (variable, value) = (
-                text(0, "launch_configuration_name")?,
-                text(1, "expected_value")?,
-            );
-            element(
-                "condition",
-                &[(
-                    "if",
-                    Some(format!("$(eval '$(var {variable})' {sign} '{value}')")),
-                )],
-            )
+            let is_equal = name == "LaunchConfigurationEquals";
+            let sign = if is_equal { "==" } else { "!=" };
+            let variable = text(0, "launch_configuration_name")?;
+            let value = text(1, "expected_value")?;
+            let condition = format!("$(eval '$(var {variable})' {sign} '{value}')");
+            element("condition", &[("if", Some(condition))])
         }
         other if OTHER.contains(&other) => element("other", &[]),
         _ => return None,
@@ -155,72 +143,72 @@ fn tree(name: &str, given: &Arguments) -> Option<Tree> {
 }
 
 fn node(tag: &str, given: &Arguments) -> Tree {
-    let text = |name| given.text(usize::MAX, name);
     let words = match given.named("arguments") {
         Some(List(words)) => words.iter().map(PythonValue::launch_text).collect(),
         _ => Vec::new(),
     };
-    let mut tree = element(
-        tag,
-        &[
-            ("args", Some(words.join(" "))),
-            ("pkg", text("package")),
-            (
-                "exec",
-                text("executable").or_else(|| text("node_executable")),
-            ),
-            ("plugin", text("plugin").or_else(|| text("node_plugin"))),
-            ("name", text("name").or_else(|| text("node_name"))),
-            (
-                "namespace",
-                text("namespace").or_else(|| text("node_namespace")),
-            ),
-        ],
-    );
-    if let Some(List(remaps)) = given.named("remappings") {
-        for remap in remaps {
-            if let List(pair) = remap
-                && let [from, to] = &pair[..]
-            {
-                let sides = [
-                    ("from", Some(from.launch_text())),
-                    ("to", Some(to.launch_text())),
-                ];
-                tree.children.push(element("remap", &sides));
-            }
-        }
+    // The second names are those before ROS 2 Foxy.
+    let either = |name: &str| {
+        let before = format!("node_{name}");
+        let text = |name| given.text(usize::MAX, name);
+        text(name).or_else(|| text(&before))
+    };
+    let attributes = [
+        ("args", Some(words.join(" "))),
+        ("pkg", given.text(usize::MAX, "package")),
+        ("exec", either("executable")),
+        ("plugin", either("plugin")),
+        ("name", either("name")),
+        ("namespace", either("namespace")),
+    ];
+    let remaps = match given.named("remappings") {
+        Some(List(remaps)) => &remaps[..],
+        _ => &[],
+    };
+    Tree {
+        children: pairs("remap", ["from", "to"], remaps),
+        ..element(tag, &attributes)
     }
-    tree
 }
 
 fn include(given: &Arguments) -> Tree {
     let file = given.text(0, "launch_description_source");
     // In ROS 2 an included file inherits the arguments of the including file.
-    let mut tree = element(
-        "include",
-        &[("file", file), ("pass_all_args", Some("true".to_owned()))],
-    );
-    let pairs = match given.get(1, "launch_arguments") {
+    let attributes = [("file", file), ("pass_all_args", Some("true".to_owned()))];
+    let passed = match given.get(1, "launch_arguments") {
         Some(List(pairs)) => pairs.clone(),
         Some(Dict(map)) => {
-            let pair =
-                |(key, value): &(String, PythonValue)| List(vec![Text(key.clone()), value.clone()]);
-            map.iter().map(pair).collect()
+            let pairs = map.iter();
+            pairs
+                .map(|(key, value)| List(vec![Text(key.clone()), value.clone()]))
+                .collect()
         }
         _ => Vec::new(),
     };
-    for pair in pairs {
-        if let List(pair) = pair
-            && let [name, value] = &pair[..]
-        {
-            let sides = [
-                ("name", Some(name.launch_text())),
-                ("value", Some(value.launch_text())),
-            ];
-            tree.children.push(element("arg", &sides));
-        }
+    Tree {
+        children: pairs("arg", ["name", "value"], &passed),
+        ..element("include", &attributes)
     }
-    tree
+}
+
+/// An element for each pair in a list, with its parts as these attributes.
+fn pairs(tag: &str, [first, second]: [&str; 2], list: &[PythonValue]) -> Vec<Tree> {
+    let one = |pair: &PythonValue| match pair {
+        List(pair) => match &pair[..] {
+            [a, b] => {
+                let (a, b) = (a.launch_text(), b.launch_text());
+                Some(element(tag, &[(first, Some(a)), (second, Some(b))]))
+            }
+            _ => None,
+        },
+        _ => None,
+    };
+    list.iter().filter_map(one).collect()
+}
+
+/// A group whose settings apply to what follows it.
+fn unscoped() -> Tree {
+    element("group", &[("scoped", Some("false".to_owned()))])
 }
 
 fn element(tag: &str, attributes: &[(&str, Option<String>)]) -> Tree {

@@ -1,22 +1,19 @@
-//! The event log of a mission: its log as lines for people or rows for programs, independent of windows.
-
-mod sentence;
+//! The event log as lines for people or rows for programs, independent of windows.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-pub(crate) use self::sentence::{predicate, sentence, sentence_with};
-use super::json::events::rows;
-pub(crate) use super::json::events::text as quoted;
+use serde::Serialize;
+
+use super::sentence::{interrupted, node_names, sentence, switched};
+use super::{Detail, Event, EventId, Interruption, InterruptionKind, Kind, Parts, Phase, Switch};
 use crate::base::columns::hang;
 use crate::base::csv;
 use crate::base::time::Stamp;
-use crate::base::words::{self, visible, worded};
-use crate::graph::{ById, Element, NodeId};
+use crate::base::words::{self, visible, visible_json, worded};
+use crate::graph::{ById, Element};
 use crate::mission::Mission;
-use crate::mission::event_log::{
-    Detail, Event, EventId, Interruption, InterruptionKind, Kind, Parts, Phase, Switch,
-};
+use crate::mission::json::{event_rows, text};
 
 worded! {
     /// The format of a log.
@@ -165,9 +162,10 @@ fn chosen(mission: &Mission, options: LogOptions) -> Vec<LogRow<'_>> {
 }
 
 /// The largest uncertainty of a time that is written as exact, in nanoseconds: a recorder looks for new topics once a
-/// second.
+/// second, and finds a node within 2.5 s of its start, so that nearly every start is within it.
 const SURE_NS: i64 = 4_000_000_000;
-/// The largest uncertainty of a time that is written as "about", in nanoseconds; with more, it is written as a range.
+/// The largest uncertainty of a time that is written as "about", in nanoseconds; with more, it is written as a range, since a second
+/// in the middle of it would be taken for the time.
 const ABOUT_NS: i64 = 10_000_000_000;
 
 /// The time of an event, counted from the mission's start: `00:37.9`, `~00:37`, or `00:35–00:58`.
@@ -242,8 +240,8 @@ fn when_and_what(mission: &Mission, parts: &Parts, row: &LogRow<'_>) -> (String,
     let tenths = |time| words::offset_tenths(mission.offset(time));
     match row {
         LogRow::Phase(number, phase) => (tenths(phase.span.start), title(*number, phase)),
-        LogRow::Interruption(one) => (tenths(one.time), sentence::interrupted(one)),
-        LogRow::Switch(one) => (tenths(one.time), sentence::switched(one)),
+        LogRow::Interruption(one) => (tenths(one.time), interrupted(one)),
+        LogRow::Switch(one) => (tenths(one.time), switched(one)),
         LogRow::Event(id, event) | LogRow::Part(id, event) => {
             (at(mission, event), sentence(mission, parts, *id, event))
         }
@@ -326,36 +324,81 @@ const COLUMNS: [&str; 16] = [
     "weight",
 ];
 
+/// What is not about an element, as a row.
+#[derive(Serialize)]
+struct PeriodRow<'a> {
+    kind: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    number: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    name: Option<&'a str>,
+    time_ns: Stamp,
+    until_ns: Stamp,
+}
+
+impl LogRow<'_> {
+    /// A phase or an interruption, until the time to which the clock went back, or at which messages came again.
+    fn period(&self) -> Option<PeriodRow<'_>> {
+        match self {
+            Self::Phase(at, phase) => Some(PeriodRow {
+                kind: "phase",
+                number: Some(at + 1),
+                name: Some(&phase.name),
+                time_ns: phase.span.start,
+                until_ns: phase.span.end,
+            }),
+            Self::Interruption(one) => Some(PeriodRow {
+                kind: one.kind.word(),
+                number: None,
+                name: None,
+                time_ns: one.time,
+                until_ns: match one.kind {
+                    InterruptionKind::ClockBack => one.time.plus(-one.length),
+                    InterruptionKind::Nothing => one.time.plus(one.length),
+                },
+            }),
+            Self::Switch(_) | Self::Event(..) | Self::Part(..) => None,
+        }
+    }
+}
+
 fn csv(mission: &Mission, bag: Option<&str>, rows: &[LogRow<'_>]) -> String {
-    let cells = |row: &LogRow<'_>| match row {
-        LogRow::Phase(at, phase) => phase_cells(*at, phase),
-        LogRow::Interruption(one) => interruption_cells(one),
-        LogRow::Switch(_) => Vec::new(),
+    let rows = rows.iter().map(|row| match row {
         LogRow::Event(id, event) | LogRow::Part(id, event) => cells(mission, *id, event),
-    };
-    let bag = bag.map(str::to_owned);
-    csv::lines(
-        rows.iter()
-            .map(|row| bag.clone().into_iter().chain(cells(row))),
-    )
+        other => other.period().map_or_else(Vec::new, |one| {
+            let mut cells = vec![String::new(); COLUMNS.len()];
+            cells[0] = one.time_ns.0.to_string();
+            one.kind.clone_into(&mut cells[1]);
+            cells[3] = visible(one.name.unwrap_or_default()).into_owned();
+            cells[5] = one.number.map_or_else(String::new, |n| n.to_string());
+            cells[8] = one.until_ns.0.to_string();
+            cells
+        }),
+    });
+    csv::lines(rows.map(|cells| bag.map(str::to_owned).into_iter().chain(cells)))
 }
 
 fn cells(mission: &Mission, id: EventId, event: &Event) -> Vec<String> {
-    let elements = &mission.elements;
-    let (node, topic) = elements.ends(event.what);
-    let node = node.map(|id| visible(elements.nodes[id].name.as_str()).into_owned());
-    let topic = topic.map(|id| visible(elements.topics[id].name.as_str()).into_owned());
+    let (node, topic) = mission.elements.names(event.what);
     let (name, topic) = match event.what {
         Element::Topic(_) => (topic, None),
         _ => (node, topic),
     };
-    let (before, after) = values(mission, event);
+    let shown = |name: Option<&str>| visible(name.unwrap_or_default()).into_owned();
+    let names = |nodes: &[_]| node_names(&mission.elements, nodes, " ");
+    let (before, after) = match &event.detail {
+        Detail::None => (String::new(), String::new()),
+        Detail::Rates { from_hz, to_hz } => (from_hz.to_string(), to_hz.to_string()),
+        Detail::Count(many) => (String::new(), many.to_string()),
+        Detail::Senders { from, to } => (names(from), names(to)),
+        Detail::Values { from, to } => (shown(Some(from)), shown(Some(to))),
+    };
     vec![
         event.time.0.to_string(),
         event.kind.word().to_owned(),
         event.what.word().to_owned(),
-        name.unwrap_or_default(),
-        topic.unwrap_or_default(),
+        shown(name),
+        shown(topic),
         id.to_string(),
         event.earliest.0.to_string(),
         event.latest.0.to_string(),
@@ -370,102 +413,27 @@ fn cells(mission: &Mission, id: EventId, event: &Event) -> Vec<String> {
     ]
 }
 
-/// The values of an event before and after: numbers, names or texts.
-fn values(mission: &Mission, event: &Event) -> (String, String) {
-    let names = |nodes: &[NodeId]| {
-        let name = |id: &NodeId| visible(mission.elements.nodes[*id].name.as_str()).into_owned();
-        nodes.iter().map(name).collect::<Vec<_>>().join(" ")
-    };
-    match &event.detail {
-        Detail::None => (String::new(), String::new()),
-        Detail::Rates { from_hz, to_hz } => (from_hz.to_string(), to_hz.to_string()),
-        Detail::Count(many) => (String::new(), many.to_string()),
-        Detail::Senders { from, to } => (names(from), names(to)),
-        Detail::Values { from, to } => (visible(from).into_owned(), visible(to).into_owned()),
-    }
-}
-
-fn phase_cells(at: usize, phase: &Phase) -> Vec<String> {
-    let mut cells = vec![String::new(); COLUMNS.len()];
-    cells[0] = phase.span.start.0.to_string();
-    "phase".clone_into(&mut cells[1]);
-    cells[3] = visible(&phase.name).into_owned();
-    cells[5] = (at + 1).to_string();
-    cells[8] = phase.span.end.0.to_string();
-    cells
-}
-
-fn interruption_cells(one: &Interruption) -> Vec<String> {
-    let mut cells = vec![String::new(); COLUMNS.len()];
-    cells[0] = one.time.0.to_string();
-    one.kind.word().clone_into(&mut cells[1]);
-    cells[8] = until(one).0.to_string();
-    cells
-}
-
-/// The end of an interruption: the time to which the clock went back, or at which messages came again.
-fn until(one: &Interruption) -> Stamp {
-    match one.kind {
-        InterruptionKind::ClockBack => one.time.plus(-one.length),
-        InterruptionKind::Nothing => one.time.plus(one.length),
-    }
-}
-
 fn ndjson(mission: &Mission, bag: Option<&str>, rows: &[LogRow<'_>]) -> String {
-    let events = rows_of(mission);
-    let bag = bag.map(|bag| harmless(&format!("{{\"bag\":{},", quoted(bag))));
+    let events: ById<EventId, String> = event_rows(&mission.log, &mission.elements).collect();
+    let bag = bag.map(|bag| format!("{{\"bag\":{},", quoted(bag)));
     let mut all = String::new();
     for row in rows {
-        let start = all.len();
-        match row {
-            LogRow::Phase(at, phase) => all.push_str(&phase_line(*at, phase)),
-            LogRow::Interruption(one) => {
-                let (kind, time, until) = (one.kind.word(), one.time.0, until(one).0);
-                let _ = write!(
-                    all,
-                    "{{\"kind\":\"{kind}\",\"time_ns\":{time},\"until_ns\":{until}}}"
-                );
-            }
-            LogRow::Switch(_) => continue,
-            LogRow::Event(id, _) | LogRow::Part(id, _) => {
-                all.push_str(events.get(*id).map_or("{}", String::as_str));
-            }
-        }
-        if let Some(bag) = &bag {
-            all.replace_range(start..=start, bag);
-        }
+        let json = match row {
+            LogRow::Event(id, _) | LogRow::Part(id, _) => events.get(*id).cloned(),
+            other => other.period().map(|one| text(&one)),
+        };
+        let Some(json) = json else { continue };
+        let json = match &bag {
+            Some(bag) => json.replacen('{', bag, 1),
+            None => json,
+        };
+        all.push_str(&visible_json(&json));
         all.push('\n');
     }
     all
 }
 
-/// Every event as an object on one line.
-fn rows_of(mission: &Mission) -> ById<EventId, String> {
-    rows(&mission.log, &mission.elements)
-        .map(|row| harmless(&row))
-        .collect()
-}
-
-fn phase_line(at: usize, phase: &Phase) -> String {
-    let (start, end) = (phase.span.start.0, phase.span.end.0);
-    let name = quoted(&phase.name);
-    let number = at + 1;
-    harmless(&format!(
-        "{{\"kind\":\"phase\",\"number\":{number},\"name\":{name},\"time_ns\":{start},\"until_ns\":{end}}}"
-    ))
-}
-
-/// JSON in which invisible characters are escapes.
-fn harmless(json: &str) -> String {
-    let mut all = String::with_capacity(json.len());
-    for c in json.chars() {
-        if words::is_invisible(c) {
-            for unit in c.encode_utf16(&mut [0; 2]) {
-                let _ = write!(all, "\\u{unit:04x}");
-            }
-        } else {
-            all.push(c);
-        }
-    }
-    all
+/// A text in quotes, as in JSON.
+pub(crate) fn quoted(name: &str) -> String {
+    text(&name)
 }

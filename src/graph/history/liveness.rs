@@ -1,8 +1,9 @@
-//! The evidence for each element as a track: signs, ends and rhythms, from which its lifetimes are computed.
+//! The evidence that each element was alive: signs, ends and rhythms, from which its lifetimes are computed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
+use crate::base::ids::Few;
 use crate::base::name::{is_feedback, is_log, lies_in};
 use crate::base::rhythm::{CROWD_NS, FOUND_NS, broken_after};
 use crate::base::role::{role, start};
@@ -11,38 +12,28 @@ use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;
 use crate::evidence::inference::{ElementKey, Inference, Reliability, Validity};
 use crate::evidence::observation::Name;
-use crate::evidence::{Confidence, Evidence, SOURCES};
-use crate::graph::ById;
-use crate::graph::history::lifetimes::{Extent, Liveness, Pulse};
-use crate::graph::history::restarts::{Restart, Restarts};
+use crate::evidence::{Confidence, Evidence, SOURCES, source_word};
+use crate::graph::history::lifetimes::{Extent, Likes, Liveness, LivenessOf, Pulse};
+use crate::graph::history::restarts::{LATCHED, Restart, Restarts};
 use crate::graph::history::senders::{Sender, Senders, Traffic};
 use crate::graph::history::{Stretch, begins_steadily};
 
-/// The track of every element.
-///
-/// Boxed, since the tree reserves much unused memory.
-pub(crate) type Tracks = BTreeMap<ElementKey, Box<Liveness>>;
-
-/// The elements that exist as long as others, each with its other.
-pub(crate) type Likes = Vec<(ElementKey, ElementKey)>;
-
-/// Adds the signs of all evidence to the track of its element. Takes the inferences out of the findings, of which
+/// Adds the signs of all evidence to the liveness of its element. Takes the inferences out of the findings, of which
 /// there may be very many.
-pub(crate) fn tracks(
+pub(crate) fn collect(
     recorded: &Recorded,
     findings: &mut Findings,
     traffic: &Traffic,
     (restarts, pauses): (&Restarts, &[Span]),
-) -> io::Result<(Tracks, Likes)> {
-    let mut tracks = Tracks::new();
+) -> io::Result<(LivenessOf, Likes)> {
+    let mut liveness_of = LivenessOf::new();
     let mut likes = Likes::new();
     let sent = sent(&findings.inferences);
     // Records of `/rosout` name their nodes themselves.
-    let mut data = findings
-        .streams
-        .iter()
-        .filter(|s| !is_log(s.connection.topic.as_str()));
-    let is_rewritten = data.any(|stream| stream.trust == Reliability::First);
+    let mut streams = findings.streams.iter();
+    let is_rewritten = streams.any(|stream| {
+        stream.trust == Reliability::First && !is_log(stream.connection.topic.as_str())
+    });
     let forwarded = forwarded(findings, traffic);
     let asked = asked(findings, traffic);
     let inferences = std::mem::take(&mut findings.inferences);
@@ -51,12 +42,11 @@ pub(crate) fn tracks(
         let [node, _] = inference.what.ends();
         let own = node.map_or(&[][..], |node| restarts.of(node));
         let deaths: Vec<Stamp> = own.iter().map(|r| r.death).collect();
-        let track = tracks.entry(inference.what).or_default();
-        track.lasts |= lasts(&inference.when);
-        track.evidence = track.evidence.and(Evidence::row(inference.source));
-        track.confidence = track
-            .confidence
-            .min(confidence(&inference, findings, traffic));
+        let liveness = liveness_of.entry(inference.what).or_default();
+        liveness.lasts |= lasts(&inference.when);
+        liveness.evidence = liveness.evidence.and(Evidence::row(inference.source));
+        let confidence = confidence(&inference, findings, traffic);
+        liveness.confidence = liveness.confidence.min(confidence);
         match &inference.when {
             Validity::Messages(at) => {
                 let stream = &findings.streams[*at];
@@ -72,14 +62,14 @@ pub(crate) fn tracks(
                     known: node.is_none() && sent.contains(at),
                     begins: !is_free && !with_start,
                     beats: !is_free && !with_end,
-                    asked: node.and_then(|node| asked.some(node)).copied(),
+                    asked: node.and_then(|node| asked.get(&node)).copied(),
                     restarts: own,
                     pauses,
                 };
-                follow(track, senders, place, &what);
+                follow(liveness, senders, place, &what);
                 if !deaths.is_empty() {
                     let times = recorded.messages.times(stream.times)?;
-                    track.bound_all(&times, &deaths);
+                    liveness.bound_all(&times, &deaths);
                 }
             }
             Validity::First(at) => {
@@ -88,43 +78,43 @@ pub(crate) fn tracks(
                     && let Some(place) = senders.place(*at)
                     && let Some((first, _)) = senders.traces[place]
                 {
-                    track.bound_all(&[first], &[]);
+                    liveness.bound_all(&[first], &[]);
                 }
             }
             Validity::Signs { signs, ends } => {
                 let ends = together(ends, &deaths);
-                track.sign_all(signs, &ends);
+                liveness.sign_all(signs, &ends);
                 if is_from(&inference, "statistics") {
-                    track.counted.extend(signs.first());
+                    liveness.counted.extend(signs.first());
                 }
                 if SOURCES.get(inference.source).is_some_and(|s| s.own) {
-                    track.last_sign = track.last_sign.max(signs.last().copied());
-                    track.speaks = true;
+                    liveness.last_sign = liveness.last_sign.max(signs.last().copied());
+                    liveness.speaks = true;
                 }
             }
             Validity::Begins { signs, ends } => {
                 let ends = together(ends, &deaths);
-                track.bound_all(signs, &ends);
+                liveness.bound_all(signs, &ends);
                 // Earlier messages of the node may have another's name.
                 if !is_rewritten || !is_from(&inference, "rosout") {
-                    track.begins.extend(signs);
+                    liveness.begins.extend(signs);
                 }
             }
-            Validity::Moments(signs) => track.bound_all(signs, &deaths),
-            Validity::Unending => track.unending = true,
+            Validity::Moments(signs) => liveness.bound_all(signs, &deaths),
+            Validity::Unending => liveness.unending = true,
             Validity::Like(other) => likes.push((inference.what, *other)),
-            Validity::Whole => track.extent = track.extent.max(Extent::Whole),
-            Validity::Always => track.extent = Extent::Always,
+            Validity::Whole => liveness.extent = liveness.extent.max(Extent::Whole),
+            Validity::Always => liveness.extent = Extent::Always,
         }
     }
     for (node, restarts) in restarts.with_ids() {
         for restart in restarts {
-            let track = tracks.entry(ElementKey::Node(node)).or_default();
-            track.signs.extend([restart.death, restart.birth]);
-            track.ends.push(restart.death);
+            let liveness = liveness_of.entry(ElementKey::Node(node)).or_default();
+            liveness.signs.extend([restart.death, restart.birth]);
+            liveness.ends.push(restart.death);
         }
     }
-    Ok((tracks, likes))
+    Ok((liveness_of, likes))
 }
 
 /// The publications, as node and topic, that forward the messages of others, and whether they begin and end with
@@ -142,13 +132,11 @@ fn forwarded(findings: &Findings, traffic: &Traffic) -> BTreeMap<(Name, Name), (
         stream.map(|s| &s.connection.type_name)
     };
     let ends = |&(node, topic): &(Name, Name)| {
-        let inputs = findings
-            .inferences
-            .iter()
-            .filter_map(|inference| match inference.what {
-                ElementKey::Subscribe(input, of) if of == node && input != topic => Some(input),
-                _ => None,
-            });
+        let all = findings.inferences.iter();
+        let inputs = all.filter_map(|inference| match inference.what {
+            ElementKey::Subscribe(input, of) if of == node && input != topic => Some(input),
+            _ => None,
+        });
         let inputs: BTreeSet<Name> = inputs.filter(|input| kind(*input) == kind(topic)).collect();
         let inputs = || inputs.iter().filter_map(|input| bounds(*input, None));
         let ((first, early), (last, late)) = bounds(topic, Some(node))?;
@@ -162,13 +150,11 @@ fn forwarded(findings: &Findings, traffic: &Traffic) -> BTreeMap<(Name, Name), (
 
 /// When others sent the first message to each node, on a topic below its name: what it sends at once is the answer
 /// of a node that was there.
-fn asked(findings: &Findings, traffic: &Traffic) -> ById<Name, Option<Stamp>> {
+fn asked(findings: &Findings, traffic: &Traffic) -> BTreeMap<Name, Stamp> {
     let senders = || traffic.iter().flatten().flat_map(|of| &of.list);
-    let nodes: BTreeMap<_, Name> = senders()
-        .filter_map(|sender| sender.node)
-        .map(|node| (findings.text(node), node))
-        .collect();
-    let mut asked: ById<Name, Option<Stamp>> = ById::default();
+    let nodes = senders().filter_map(|sender| sender.node);
+    let nodes: BTreeMap<_, Name> = nodes.map(|node| (findings.text(node), node)).collect();
+    let mut asked: BTreeMap<Name, Stamp> = BTreeMap::new();
     for (topic, of) in traffic.somes() {
         let name = format!("/{}", findings.text(topic).trim_start_matches('/'));
         let Some((space, _)) = name.rsplit_once('/') else {
@@ -176,11 +162,9 @@ fn asked(findings: &Findings, traffic: &Traffic) -> ById<Name, Option<Stamp>> {
         };
         let owner = nodes.get(space).filter(|_| lies_in(&name, space));
         let others = of.list.iter().filter(|s| s.node.as_ref() != owner);
-        let first = others
-            .filter_map(|s| Some(s.stretches.first()?.first))
-            .min();
-        if let Some((owner, first)) = owner.zip(first) {
-            let known = asked.grown(*owner).get_or_insert(first);
+        let first = others.filter_map(|s| Some(s.stretches.first()?.first));
+        if let Some((owner, first)) = owner.zip(first.min()) {
+            let known = asked.entry(*owner).or_insert(first);
             *known = first.min(*known);
         }
     }
@@ -203,12 +187,9 @@ fn confidence(inference: &Inference, findings: &Findings, traffic: &Traffic) -> 
 
 /// The streams with a known publisher, whose messages show a publication.
 fn sent(inferences: &[Inference]) -> BTreeSet<usize> {
-    let sent = inferences.iter().filter_map(|inference| match inference {
-        Inference {
-            what: ElementKey::Publish(..),
-            when: Validity::Messages(at),
-            ..
-        } => Some(*at),
+    let edges = inferences.iter().map(|one| (one.what, &one.when));
+    let sent = edges.filter_map(|edge| match edge {
+        (ElementKey::Publish(..), Validity::Messages(at)) => Some(*at),
         _ => None,
     });
     sent.collect()
@@ -216,9 +197,7 @@ fn sent(inferences: &[Inference]) -> BTreeSet<usize> {
 
 /// Whether an inference is from the source of this name.
 fn is_from(inference: &Inference, source: &str) -> bool {
-    SOURCES
-        .get(inference.source)
-        .is_some_and(|s| s.word == source)
+    source_word(inference.source) == source
 }
 
 /// Whether an inference is still valid after its last sign.
@@ -232,9 +211,6 @@ fn together(a: &[Stamp], b: &[Stamp]) -> Vec<Stamp> {
     all.sort_unstable();
     all
 }
-
-/// The most messages of a latched topic: one with more is sent again all the time.
-const LATCHED: u64 = 20;
 
 /// Facts about a stream that is followed.
 struct Followed<'a> {
@@ -250,24 +226,24 @@ struct Followed<'a> {
     pauses: &'a [Span],
 }
 
-/// Adds the messages of one stream to the track of a publication or topic.
-fn follow(track: &mut Liveness, senders: &Senders, place: usize, what: &Followed<'_>) {
+/// Adds the messages of one stream to the liveness of a publication or topic.
+fn follow(liveness: &mut Liveness, senders: &Senders, place: usize, what: &Followed<'_>) {
     let sender = senders.of.get(place).and_then(|of| senders.list.get(*of));
     let sent = senders.traces.get(place).copied().flatten();
     let (Some((first, last)), Some(sender)) = (sent, sender) else {
-        track.extent = track.extent.max(Extent::Whole);
+        liveness.extent = liveness.extent.max(Extent::Whole);
         return;
     };
     let count: u64 = sender.stretches.iter().map(|s| s.count).sum();
     let latched = sender.latched && count <= LATCHED;
-    let messages = track.messages();
+    let messages = liveness.messages();
     messages.senders.0 += 1;
     messages.senders.1 += u32::from(latched);
     if what.known {
-        track.seen.extend([first, last]);
+        liveness.seen.extend([first, last]);
         return;
     }
-    track.signs.extend([first, last]);
+    liveness.signs.extend([first, last]);
     // A recorder receives a latched message as soon as it finds the topic, so the sender began about then, unless the
     // first one recorded may be a repetition.
     let period = sender.stretches.first().map_or(0, |s| s.period);
@@ -275,10 +251,10 @@ fn follow(track: &mut Liveness, senders: &Senders, place: usize, what: &Followed
     let answers = |asked: Stamp| (0..=CROWD_NS).contains(&first.since(asked));
     let is_proof = what.begins && first > due && !what.asked.is_some_and(answers);
     if is_proof && (latched || begins_steadily(&sender.stretches)) {
-        track.begins.push(first);
+        liveness.begins.push(first);
     }
-    track.last_sign = track.last_sign.max(Some(last));
-    let messages = track.messages();
+    liveness.last_sign = liveness.last_sign.max(Some(last));
+    let messages = liveness.messages();
     messages.reach(Some(sender.recording));
     messages.due = messages.due.max(Some(due));
     let pulse = Pulse::of(&sender.stretches, what.restarts, what.pauses);
@@ -291,40 +267,40 @@ fn follow(track: &mut Liveness, senders: &Senders, place: usize, what: &Followed
 // rhythm is that of the node's. For example, only `/lidar` names `/scan` as its own, and `/scan` at 10 Hz stops at 50 s of
 // 300 s: `/lidar` ended at 50 s.
 
-/// Adds the rhythms that stopped for good to the tracks of their only publishers. A rhythm that continues
+/// Adds the rhythms that stopped for good to the liveness of their only publishers. A rhythm that continues
 /// shows nothing: another node may have taken over the topic.
 pub(crate) fn fall_silent(
-    tracks: &mut Tracks,
+    liveness_of: &mut LivenessOf,
     traffic: &Traffic,
     findings: &Findings,
     pauses: &[Span],
 ) {
-    for (topic, nodes) in publishers(tracks).with_ids() {
+    for (topic, nodes) in publishers(liveness_of).with_ids() {
         let Some(sender) = merged(traffic, findings, topic) else {
             continue;
         };
-        for (node, stretches) in turns(nodes, sender, findings) {
+        for (node, stretches) in by_publisher(nodes, sender, findings) {
             let end = sender.recording.1.min(findings.mission.1);
-            let Some(track) = tracks.get_mut(&ElementKey::Publish(node, topic)) else {
+            let Some(liveness) = liveness_of.get_mut(&ElementKey::Publish(node, topic)) else {
                 continue;
             };
             if begins_steadily(stretches) {
-                track.begins.push(stretches[0].first);
+                liveness.begins.push(stretches[0].first);
             }
             let pulse = Pulse::of(stretches, &[], pauses).filter(|pulse| pulse.broke_off(end));
             if let Some(pulse) = pulse {
-                track.signs.push(pulse.last());
-                track.last_sign = track.last_sign.max(Some(pulse.last()));
-                track.messages().pulses.push(pulse);
+                liveness.signs.push(pulse.last());
+                liveness.last_sign = liveness.last_sign.max(Some(pulse.last()));
+                liveness.messages().pulses.push(pulse);
             }
         }
     }
 }
 
 /// The known publishers of each topic.
-fn publishers(tracks: &Tracks) -> ById<Name, Vec<Name>> {
-    let mut all: ById<Name, Vec<Name>> = ById::default();
-    for what in tracks.keys() {
+fn publishers(liveness_of: &LivenessOf) -> Few<Name, Vec<Name>> {
+    let mut all: Few<Name, Vec<Name>> = Few::default();
+    for what in liveness_of.keys() {
         if let ElementKey::Publish(node, topic) = what {
             all.grown(*topic).push(*node);
         }
@@ -342,7 +318,7 @@ fn merged<'a>(traffic: &'a Traffic, findings: &Findings, topic: Name) -> Option<
 
 /// The messages of each of the publishers: all of them for a single one; for those of one role, which take turns, those
 /// from its start to the next one's.
-fn turns<'a>(
+fn by_publisher<'a>(
     nodes: &[Name],
     sender: &'a Sender,
     findings: &Findings,
@@ -353,17 +329,16 @@ fn turns<'a>(
     let text = |node: &Name| findings.text(*node);
     let born = |node: &Name| Some((start(&text(node))?, *node));
     let births: Option<Vec<(Stamp, Name)>> = nodes.iter().map(born).collect();
-    let is_one_role = nodes
-        .windows(2)
-        .all(|p| role(&text(&p[0])) == role(&text(&p[1])));
+    let mut pairs = nodes.windows(2);
+    let is_one_role = pairs.all(|p| role(&text(&p[0])) == role(&text(&p[1])));
     let mut births = births.filter(|_| is_one_role).unwrap_or_default();
     births.sort_unstable();
     let ends = births.iter().skip(1).map(|(next, _)| *next);
     let ends = ends.chain([Stamp::MAX]);
-    let turns = births.iter().zip(ends);
-    turns
-        .filter_map(|((from, node), to)| Some((*node, within(&sender.stretches, *from, to)?)))
-        .collect()
+    let own = |((from, node), to): (&(Stamp, Name), Stamp)| {
+        Some((*node, within(&sender.stretches, *from, to)?))
+    };
+    births.iter().zip(ends).filter_map(own).collect()
 }
 
 /// The stretches of a turn; `None` if one continues into the next turn, so that two publish at the same time.

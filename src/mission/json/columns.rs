@@ -12,19 +12,13 @@
 //! the count divided by the window's length, unless a column `hz` overrides it (in which `"="` stands for
 //! that rate); a node's count is `sent`.
 
-mod columns;
-
-#[cfg(test)]
-mod tests;
-
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::elements::{Text, confidence_of, state_of};
+use super::Text;
 use crate::evidence::Confidence;
 use crate::graph::{ColumnWriter, Element, Graphs, GraphsWriter, Number, Row, State};
-use columns::{JsonColumn, JsonRate};
 
 /// The windows in which an element exists, with its states in them.
 #[derive(Default, Deserialize, Serialize)]
@@ -76,7 +70,8 @@ impl<'a> JsonColumns<'a> {
             all.jitter_s.push(row.jitter.value());
             all.age_s.push(row.age.value());
             all.hz.push(JsonRate::of(&row));
-            all.lifecycle.push(graphs.lifecycle(&row).map(Text::from));
+            all.lifecycle
+                .push(graphs.lifecycle(&row).map(|word| Text::from(&**word)));
         }
         all
     }
@@ -90,8 +85,8 @@ impl<'a> JsonColumns<'a> {
         };
         let lifecycles: Vec<u32> = self.lifecycle.values(number).take(many).collect();
         let mut lifecycles = lifecycles.into_iter();
-        let mut states = self.state.values(|word| state_of(Some(word)));
-        let mut degrees = self.degree.values(|word| confidence_of(Some(word)));
+        let mut states = self.state.values(|word| State::from_word(word));
+        let mut degrees = self.degree.values(|word| Confidence::from_word(word));
         let mut sent = self.sent.values(|count| *count);
         let mut counts = self.count.values(|count| *count);
         let mut bytes = self.bytes.values(|bytes| *bytes);
@@ -104,8 +99,8 @@ impl<'a> JsonColumns<'a> {
         let mut next = 0;
         for (from, to) in &self.windows {
             for at in (*from).max(next)..(*to).saturating_add(1).min(many) {
-                let state = states.next().unwrap_or(State::Active);
-                let degree = degrees.next().unwrap_or(Confidence::Stated);
+                let state = states.next().flatten().unwrap_or(State::Active);
+                let degree = degrees.next().flatten().unwrap_or(Confidence::Stated);
                 let row = Row {
                     lifecycle: lifecycles.next().unwrap_or(0),
                     count: sent.next().flatten().or(counts.next().flatten()),
@@ -121,6 +116,101 @@ impl<'a> JsonColumns<'a> {
                 rows.push(at, row);
                 next = at + 1;
             }
+        }
+    }
+}
+
+// Run-length encoded columns.
+
+/// Values, each with the number of its repetitions.
+#[derive(Clone, Debug, PartialEq)]
+struct JsonColumn<T>(Vec<(T, u32)>);
+
+impl<T> Default for JsonColumn<T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<T: PartialEq> JsonColumn<T> {
+    fn push(&mut self, value: T) {
+        match self.0.last_mut() {
+            Some((last, times)) if *last == value => *times = times.saturating_add(1),
+            _ => self.0.push((value, 1)),
+        }
+    }
+}
+
+impl<T: Default + PartialEq> JsonColumn<T> {
+    /// Whether all windows have the default value.
+    fn is_plain(&self) -> bool {
+        self.0.iter().all(|(value, _)| *value == T::default())
+    }
+}
+
+impl<T> JsonColumn<T> {
+    /// The meaning of every value, in order.
+    fn values<'a, U: Copy + 'a>(
+        &'a self,
+        mut meaning: impl FnMut(&T) -> U + 'a,
+    ) -> impl Iterator<Item = U> + 'a {
+        let values = self.0.iter();
+        values.flat_map(move |(value, times)| std::iter::repeat_n(meaning(value), *times as usize))
+    }
+}
+
+/// One value with the number of its repetitions, or one alone.
+#[derive(Deserialize, Serialize)]
+#[serde(untagged)]
+enum JsonCell<T> {
+    Repeated(T, u32),
+    One(T),
+}
+
+impl<T: Serialize> Serialize for JsonColumn<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.0.iter().map(|(value, times)| match times {
+            1 => JsonCell::One(value),
+            _ => JsonCell::Repeated(value, *times),
+        }))
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for JsonColumn<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let cells = Vec::<JsonCell<T>>::deserialize(deserializer)?;
+        let cells = cells.into_iter().map(|cell| match cell {
+            JsonCell::Repeated(value, times) => (value, times),
+            JsonCell::One(value) => (value, 1),
+        });
+        Ok(Self(cells.collect()))
+    }
+}
+
+/// A rate: computed from the count, which is written as `=`, or another.
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+#[serde(untagged)]
+enum JsonRate {
+    Other(Option<f64>),
+    Counted(char),
+}
+
+impl Default for JsonRate {
+    fn default() -> Self {
+        Self::Counted('=')
+    }
+}
+
+impl JsonRate {
+    fn of(row: &Row) -> Self {
+        row.rate
+            .map_or_else(Self::default, |rate| Self::Other(rate.value()))
+    }
+
+    fn number(&self) -> Option<Number> {
+        match self {
+            Self::Counted(_) => None,
+            Self::Other(hz) => Some(Number::of(*hz)),
         }
     }
 }

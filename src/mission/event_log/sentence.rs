@@ -2,16 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::name::is_quiet;
+use super::{Detail, Event, EventId, Interruption, InterruptionKind, Kind, Parts, Switch};
+use crate::base::name::{is_quiet, namespace};
 use crate::base::words::{self, visible};
 use crate::graph::history::begins_steadily as begins_steadily_in;
 use crate::graph::{Element, Elements, NodeId, TopicId};
 use crate::mission::Mission;
-use crate::mission::event_log::{
-    Detail, Event, EventId, Interruption, InterruptionKind, Kind, Parts, Switch,
-};
 
-/// The most topics that are listed; the rest is counted.
+/// The most topics that are listed; the rest is counted. Six names of usual length fill a line of the log; with more, events of
+/// nodes with many topics are paragraphs.
 const NAMED: usize = 6;
 
 /// The sentence, without a period: `/robot1/planner started: publishes plan; subscribes map, costmap`. `parts`: of all
@@ -39,45 +38,36 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EventId], event: &Event) -> 
             format!("{change}{}", too(mission, parts, event))
         }
         (Detail::Senders { from, to }, _) => {
-            let names = |nodes: &[NodeId]| {
-                let name = |id: &NodeId| visible(elements.nodes[*id].name.as_str()).into_owned();
-                nodes.iter().map(name).collect::<Vec<_>>().join(", ")
-            };
+            let names = |nodes: &[NodeId]| node_names(elements, nodes, ", ");
             // A third node that publishes is the mux between them.
             let mux = match event.what {
                 Element::Topic(topic) => mux(elements, topic, from.iter().chain(to)),
                 _ => Vec::new(),
             };
-            let by = if mux.is_empty() {
-                String::new()
-            } else {
-                format!(", by {}", names(&mux))
+            let by = match &mux[..] {
+                [] => String::new(),
+                mux => format!(", by {}", names(mux)),
             };
             format!("handed over: {} → {}{by}", names(from), names(to))
         }
         (Detail::Count(many), kind) => {
             let over = lasted.map_or_else(String::new, |lasted| format!(" in {lasted}"));
+            let times = words::count(*many, "time");
             match kind {
-                Kind::Lost => format!(
-                    "{} lost by the recorder{over}",
-                    words::count(*many, "message")
-                ),
-                Kind::Vanished => {
-                    format!("vanishes and appears {}{over}", words::count(*many, "time"))
+                Kind::Lost => {
+                    let messages = words::count(*many, "message");
+                    format!("{messages} lost by the recorder{over}")
                 }
-                _ => format!("appears and vanishes {}{over}", words::count(*many, "time")),
+                Kind::Vanished => format!("vanishes and appears {times}{over}"),
+                _ => format!("appears and vanishes {times}{over}"),
             }
         }
         (Detail::Values { to, .. }, Kind::Starved) => starved(event.what, to),
         (Detail::None, Kind::Duplicate) => "is the name of two nodes".to_owned(),
         (Detail::Values { from, to }, kind) => {
-            let or = |text: &str| {
-                let shown = visible(text).into_owned();
-                if shown.is_empty() {
-                    "unknown".to_owned()
-                } else {
-                    shown
-                }
+            let or = |text: &str| match visible(text) {
+                shown if shown.is_empty() => "unknown".to_owned(),
+                shown => shown.into_owned(),
             };
             let change = format!("{} → {}", or(from), or(to));
             if mission.log.compares {
@@ -104,14 +94,19 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EventId], event: &Event) -> 
             let is_first = kind == Kind::Appeared
                 && !mission.log.compares
                 && !begins_steadily(mission, event.what);
-            let word = if is_first {
-                "first message"
-            } else {
-                mission.log.word(kind)
+            let word = match mission.log.word(kind) {
+                _ if is_first => "first message",
+                word => word,
             };
             format!("{word}{}", too(mission, parts, event))
         }
     }
+}
+
+/// The names of nodes in one text.
+pub(super) fn node_names(elements: &Elements, nodes: &[NodeId], between: &str) -> String {
+    let name = |id: &NodeId| visible(elements.nodes[*id].name.as_str()).into_owned();
+    nodes.iter().map(name).collect::<Vec<_>>().join(between)
 }
 
 /// The publishers of a topic, if none of `ends` is one.
@@ -250,9 +245,7 @@ fn with(mission: &Mission, parts: &[EventId], event: &Event) -> String {
             _ => false,
         };
     }
-    let space = node.map_or("", |id| {
-        crate::base::name::namespace(elements.nodes[id].name.as_str())
-    });
+    let space = node.map_or("", |id| namespace(elements.nodes[id].name.as_str()));
     let phrases = [("publishes", sends), ("subscribes to", takes)].map(|(verb, topics)| {
         let names = short_topics(elements, &topics, space);
         (!names.is_empty()).then(|| format!("{verb} {}", words::some_of(&names, NAMED)))
