@@ -13,11 +13,11 @@ mod report;
 mod values;
 
 pub(crate) use baseline::{Runs, update, write};
-pub use difference::{DiffFormat, DiffSubject, Difference, Where};
+pub use difference::{DiffSubject, Difference, Where};
 pub(crate) use difference::{Side, differences, pairs, union};
 pub(crate) use expectation::{Expectation, read};
 pub use finding::{Cause, Finding, FindingKind, Severity};
 pub(crate) use judge::judge;
 pub use judge::{CheckedFact, Judgement, Verdict};
-pub use report::CheckFormat;
+pub use report::ReportFormat;
 pub(crate) use report::{FORMATS, Subject, explain};

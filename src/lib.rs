@@ -159,8 +159,8 @@ pub mod values {
         export::tables::TableFormat,
         export::target::Target,
         gate::{
-            Cause, CheckFormat, CheckedFact, DiffFormat, DiffSubject, Difference, Finding,
-            FindingKind, Judgement, Severity, Verdict, Where,
+            Cause, CheckedFact, DiffSubject, Difference, Finding, FindingKind, Judgement,
+            ReportFormat, Severity, Verdict, Where,
         },
         layout::{Engine, Orientation},
         pipeline::{Body, Drawing, Purpose},

@@ -3,9 +3,9 @@
 use crate::base::words::worded;
 mod collect;
 #[cfg(feature = "render")]
-mod draw;
+mod compose;
 #[cfg(feature = "render")]
-mod export;
+mod drawing;
 #[cfg(feature = "render")]
 mod extract;
 #[cfg(feature = "render")]
@@ -19,9 +19,9 @@ mod gate;
 mod inputs;
 mod phases;
 mod probe;
-#[cfg(feature = "render")]
-mod purpose;
 mod read;
+#[cfg(feature = "render")]
+mod render;
 #[cfg(feature = "render")]
 mod survey;
 #[cfg(feature = "render")]
@@ -31,11 +31,9 @@ mod unfolded;
 mod verify;
 
 #[cfg(feature = "render")]
-pub use draw::{Body, Drawing};
+pub(crate) use drawing::Medium;
 #[cfg(feature = "render")]
-pub use export::{Render, Rendered};
-#[cfg(feature = "render")]
-pub(crate) use export::{render, show};
+pub use drawing::{Body, Drawing, Purpose};
 #[cfg(feature = "render")]
 pub use extract::{Extract, Extracted, extract};
 #[cfg(feature = "render")]
@@ -43,18 +41,18 @@ pub use gate::{
     Baseline, BaselineWritten, Check, Checked, Compared, Diff, Report, baseline, check, diff,
 };
 pub use phases::Phases;
-#[cfg(feature = "render")]
-pub(crate) use purpose::Medium;
-#[cfg(feature = "render")]
-pub use purpose::Purpose;
 pub use read::{Reading, explain, read};
+#[cfg(feature = "render")]
+pub use render::{Render, Rendered};
+#[cfg(feature = "render")]
+pub(crate) use render::{render, show};
 #[cfg(feature = "render")]
 pub use survey::{Survey, is_survey, survey, survey_file};
 #[cfg(feature = "render")]
 pub use tables::{Counted, Counting, Tabled, Tables, count, tables};
 #[cfg(feature = "cli")]
 pub(crate) use {
-    export::check as check_outputs, gate::expectation, read::mission_file, survey::each,
+    gate::expectation, read::mission_file, render::check as check_outputs, survey::each,
 };
 
 worded! {

@@ -151,20 +151,6 @@ pub(super) fn check_topics(given: &Given, outputs: &[Output]) -> Result<()> {
     )
 }
 
-/// Refuses outputs that cannot contain a figure.
-pub(super) fn check_figure(outputs: &[Output]) -> Result<()> {
-    match outputs.iter().find(|output| !is_whole(output)) {
-        None => Ok(()),
-        Some(output) => Err(Error::usage(
-            format!(
-                "`{}` cannot contain a figure",
-                output.target.path().display()
-            ),
-            "figures are `.pdf`, `.svg`, `.png` or `.webp`, and `.tex` to include them; `bagreel render` writes the rest",
-        )),
-    }
-}
-
 /// Options for how bags are read and windows cut: a mission's JSON contains windows already.
 const OF_BAGS: &str = "offset ns verify period step start end align cut topology source infer";
 

@@ -14,7 +14,7 @@ use crate::base::error::{Error, Result};
 use crate::base::notice::Notices;
 use crate::base::words;
 use crate::export::target::Target;
-use crate::gate::{CheckFormat, FORMATS, Judgement, Severity, explain};
+use crate::gate::{Judgement, ReportFormat, Severity, explain};
 use crate::graph::window::Length;
 use crate::mission::Mission;
 use crate::pipeline::{self, Baseline, Check, Diff, Reading, Report};
@@ -42,12 +42,16 @@ pub(super) fn diff(args: &DiffArgs, given: &Given, terminal: &mut Terminal) -> R
         applies::check_inputs(given, reading)?;
     }
     let done = pipeline::diff(&job, terminal)?;
-    print(&job.report(&done, args.format), args.format.word, terminal)?;
+    print(
+        &job.report(&done.differences, args.format),
+        args.format.word,
+        terminal,
+    )?;
     for remark in &done.remarks {
         terminal.note(remark);
     }
     terminal.notices(&notices(&done.missions));
-    let reports = job.reports.iter().map(|(target, _)| target);
+    let reports = job.reports.iter().map(|report| &report.target);
     let targets = reports.chain(job.pictures.iter().map(|picture| &picture.target));
     let what = words::count(done.differences.len(), "difference");
     wrote(targets, &what, terminal);
@@ -94,11 +98,10 @@ fn against(
     (bag, expect): (&Path, &Path),
     terminal: &mut Terminal,
 ) -> Result<u8> {
-    let format = CheckFormat::from_word(args.format.word);
     let check = CheckArgs {
         bags: vec![bag.to_owned()],
         expect: Some(expect.to_owned()),
-        format: format.unwrap_or(&FORMATS[0]),
+        format: args.format,
         outputs: args.outputs.clone(),
         undecidable: Undecidable::Allow,
         explain: None,
@@ -185,7 +188,7 @@ pub(super) fn judge_closed(
     reading: Reading,
     what: &Path,
     expect: &Path,
-    format: Option<&CheckFormat>,
+    format: Option<&ReportFormat>,
     terminal: &mut Terminal,
 ) -> Result<u8> {
     let mut job = Check::new(reading, expect);
@@ -195,7 +198,7 @@ pub(super) fn judge_closed(
 }
 
 /// Runs the check, prints the findings if a format is given, and returns the exit code.
-fn verdict(job: &Check, format: Option<&CheckFormat>, terminal: &mut Terminal) -> Result<u8> {
+fn verdict(job: &Check, format: Option<&ReportFormat>, terminal: &mut Terminal) -> Result<u8> {
     let done = pipeline::check(job, terminal)?;
     if let Some(format) = format {
         print(&job.report(&done, format), format.word, terminal)?;
@@ -248,7 +251,7 @@ fn judged(bags: &[PathBuf], range: RangeArgs, graph: &GraphArgs) -> Result<Readi
 /// A report to write; Markdown if it is a CI job's summary file, which has no extension.
 fn report(output: &OsStr) -> Result<Report> {
     let is_summary = summary().is_some_and(|path| path == Path::new(output));
-    match CheckFormat::from_word("markdown").filter(|_| is_summary) {
+    match ReportFormat::from_word("markdown").filter(|_| is_summary) {
         Some(format) => Ok(Report {
             target: Target::parse(output),
             format,

@@ -53,7 +53,6 @@ pub(super) fn figure(
     terminal: &mut Terminal,
 ) -> Result<u8, Error> {
     let job = figure_job(args)?;
-    applies::check_figure(&job.outputs)?;
     crate::pipeline::check_outputs(&job)?;
     applies::check_inputs(given, &job.reading)?;
     make_room(&job, terminal);

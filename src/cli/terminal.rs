@@ -88,11 +88,8 @@ impl Terminal {
         } else {
             ("36", "note")
         };
-        let times = match notice.count {
-            0 | 1 => String::new(),
-            n => format!(" ({n} times)"),
-        };
-        self.line(colour, label, &format!("{}{times}", notice.text));
+        let text = notice.text.clone() + &notice.times();
+        self.line(colour, label, &text);
     }
 
     /// Prints a line on standard error unless quiet.

@@ -7,7 +7,7 @@ use super::palette::{Area, Palette};
 use super::sequence::{FrameTime, Sequence};
 use super::sink::{OutputSink, write_file};
 use super::target::Target;
-use crate::base::error::{Error, Result};
+use crate::base::error::Result;
 use crate::draw::paint::raster::Pixels;
 use crate::draw::scene::Scene;
 use crate::view::union;
@@ -85,39 +85,6 @@ impl Written {
     pub(crate) fn add(&mut self, bytes: u64) {
         self.files += 1;
         self.bytes += bytes;
-    }
-}
-
-/// The drawings that a format of single drawings writes to a target.
-#[derive(Clone, Copy)]
-pub(crate) enum Single<'a> {
-    /// A file per window, or the only window.
-    Windows,
-    /// The strip in one file.
-    Strip(&'a Scene),
-}
-
-/// The drawings for a target: with `{n}`, or for one window, a file per window; else the strip, if there is one and
-/// `strip` allows it.
-pub(crate) fn single<'a>(
-    sequence: &Sequence<'a>,
-    target: &Target,
-    strip: bool,
-) -> Result<Single<'a>> {
-    let windows = sequence.view.frames.len();
-    if target.is_numbered() {
-        return Ok(Single::Windows);
-    }
-    match sequence.strip.filter(|_| strip) {
-        Some(scene) => Ok(Single::Strip(scene)),
-        None if windows <= 1 => Ok(Single::Windows),
-        None => Err(Error::usage(
-            format!(
-                "`{}` is one file for {windows} windows",
-                target.path().display()
-            ),
-            "put `{n}` into the name for a file per window, or use `--strip`",
-        )),
     }
 }
 

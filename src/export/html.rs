@@ -187,11 +187,7 @@ impl HtmlPage<'_> {
         for notice in self.sequence.notices.iter() {
             // The page has fonts for all characters, and all collapsed elements.
             if notice.kind != NoticeKind::Glyph {
-                let times = match notice.count {
-                    0 | 1 => String::new(),
-                    n => format!(" ({n} times)"),
-                };
-                let text = format!("{}{times}", visible(&notice.text));
+                let text = visible(&notice.text).into_owned() + &notice.times();
                 xml.open("li").text(&text).close();
             }
         }

@@ -1,36 +1,40 @@
 //! A report in Markdown for a pull request or a job summary: the changes with their times, drawn and in tables.
 
 mod changes;
-pub(crate) mod encoder;
-pub(crate) mod escape;
-mod graph;
-mod tables;
+mod chart;
+mod elements;
 
 use std::fmt::Write as _;
 
-use crate::base::notice::Notices;
+use super::{Started, one_text};
+use crate::base::file;
+use crate::base::notice::{Notice, Notices};
 use crate::base::time::Stamp;
 use crate::base::words;
-use crate::draw::style::{BUILTIN, Style};
-use crate::export::mermaid;
+use crate::export::markdown::{self, address, folded, plain};
 use crate::export::sequence::Sequence;
+use crate::export::target::Target;
 use crate::view::{Counts, View};
-use escape::{address, plain};
 
 /// The most bytes of each part; together they stay below 256 KiB, a quarter of the limit of a job summary.
 const MOST_CHANGES: usize = 96 << 10;
 const MOST_TABLE: usize = 40 << 10;
 const MOST_NOTICES: usize = 16 << 10;
-/// The most characters of a chart; a longer one is left out, as GitHub's Mermaid stops at 50,000.
-const MOST_CHART: usize = 45_000;
 
 /// The most expanded rows of a table; the rest is collapsed.
 const MOST_OPEN: usize = 20;
-/// The most edges of an expanded chart; larger ones are collapsed.
-const MOST_EDGES_OPEN: usize = 25;
+
+/// Begins the report; it follows the text already in the file if that is the file to append to.
+///
+/// # Errors
+/// As [`one_text`]; as [`file::text_before`] for the file to append to.
+pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
+    let before = file::text_before(target.path(), sequence.options.append_to.as_deref())?;
+    one_text(target, move || before + &report(sequence))
+}
 
 /// The report.
-pub(crate) fn report(sequence: &Sequence<'_>) -> String {
+fn report(sequence: &Sequence<'_>) -> String {
     let mission = sequence.mission;
     let view = sequence.unfolded.map_or(sequence.view, |all| all.view);
     let mut out = verdict(sequence, view) + "\n\n";
@@ -54,10 +58,10 @@ pub(crate) fn report(sequence: &Sequence<'_>) -> String {
     };
     out.push_str(&changes::phases(mission, &times));
     out.push_str(&changes::table(mission, view, &times));
-    out.push_str(&chart(view));
-    out.push_str(&tables::nodes(mission, view, MOST_TABLE));
-    out.push_str(&tables::topics(mission, view, MOST_TABLE));
-    out.push_str(&tables::evidence(mission));
+    out.push_str(&chart::chart(view));
+    out.push_str(&elements::nodes(mission, view));
+    out.push_str(&elements::topics(mission, view));
+    out.push_str(&elements::evidence(mission));
     out.push_str(&notices(sequence.notices));
     out
 }
@@ -148,54 +152,36 @@ fn headline_counts(counts: &Counts) -> Vec<String> {
         .collect()
 }
 
-fn chart(view: &View) -> String {
-    let Some((seen, left_out)) = graph::changed(view) else {
+fn notices(notices: &Notices) -> String {
+    let line = |notice: Notice| format!("- {}\n", plain(&notice.text) + &notice.times());
+    let mut lines: Vec<String> = notices.iter().map(line).collect();
+    if markdown::cut(&mut lines, MOST_NOTICES) > 0 {
+        lines.push("- and more\n".to_owned());
+    }
+    if lines.is_empty() {
         return String::new();
-    };
-    // The picture's style may be dark, but Markdown has any background.
-    let Ok(style) = Style::builtin(BUILTIN[0].0) else {
-        return String::new();
-    };
-    let chart = mermaid::chart(view, &style, &seen);
-    if chart.len() > MOST_CHART {
-        return "The graph of the changes is too large for Markdown.\n\n".to_owned();
     }
-    let mut out = format!("```mermaid\n{}\n```\n\n", chart.trim_end());
-    out += "Solid green: present only at the end. Dashed orange: present only at the start. Purple: changed in between.\n";
-    if left_out > 0 {
-        let _ = writeln!(
-            out,
-            "\n{} left out of the graph.",
-            words::count(left_out, "edge")
-        );
-    }
-    let edges = words::count(seen.arrows.len(), "edge");
-    if seen.arrows.len() > MOST_EDGES_OPEN {
-        return tables::folded(&format!("Graph of the changes ({edges})"), &out);
-    }
-    format!("Changed elements and their neighbours:\n\n{out}\n")
+    folded("Notices", &lines.concat())
 }
 
-fn notices(notices: &Notices) -> String {
-    let mut out = String::new();
-    for notice in notices.iter() {
-        let times = if notice.count > 1 {
-            format!(" ({} times)", notice.count)
-        } else {
-            String::new()
-        };
-        let line = format!("- {}{times}\n", plain(&notice.text));
-        if out.len() + line.len() > MOST_NOTICES {
-            out.push_str("- and more\n");
-            break;
-        }
-        out.push_str(&line);
+/// A table of at most `most` bytes, whose last line states how many rows were cut; `None` without rows.
+fn table(heads: &[&str], mut rows: Vec<String>, most: usize) -> Option<String> {
+    if rows.is_empty() {
+        return None;
     }
-    if out.is_empty() {
-        out
-    } else {
-        tables::folded("Notices", &out)
+    let heading = markdown::table(heads, &[]).len();
+    let cut = markdown::cut(&mut rows, most.saturating_sub(heading));
+    let mut out = markdown::table(heads, &rows);
+    if cut > 0 {
+        let _ = writeln!(out, "\n{} more left out.", words::count(cut, "row"));
     }
+    Some(out)
+}
+
+/// Such a table, collapsed; nothing without rows.
+fn folded_table(summary: &str, heads: &[&str], rows: Vec<String>, most: usize) -> String {
+    let table = table(heads, rows, most);
+    table.map_or_else(String::new, |table| folded(summary, &table))
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 
 use super::values::{length, share};
 use super::{GraphArgs, RangeArgs};
-use crate::gate;
+use crate::gate::{FORMATS, ReportFormat};
 use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::Length;
 
@@ -21,7 +21,7 @@ pub(crate) struct DiffArgs {
     pub(crate) second: PathBuf,
     /// Output format.
     #[arg(long, value_name = "text|json|markdown", default_value = "text", value_parser = diff_format)]
-    pub(crate) format: &'static gate::DiffFormat,
+    pub(crate) format: &'static ReportFormat,
     /// Also write this file: `.txt`, `.json`, `.md`, or a picture of both in any format of `render`. Repeatable.
     #[arg(long = "output", short, value_name = "FILE")]
     pub(crate) outputs: Vec<OsString>,
@@ -72,7 +72,7 @@ pub(crate) struct CheckArgs {
     pub(crate) expect: Option<PathBuf>,
     /// Output format.
     #[arg(long, value_name = "WORD", default_value = "text", value_parser = check_format)]
-    pub(crate) format: &'static gate::CheckFormat,
+    pub(crate) format: &'static ReportFormat,
     /// Also write this file, in the format of its extension or prefix: `check.xml`, `gitlab:quality.json`. Repeatable.
     #[arg(long = "output", short, value_name = "[WORD:]FILE")]
     pub(crate) outputs: Vec<OsString>,
@@ -108,20 +108,21 @@ pub(crate) const BASELINE_HELP: &str =
 pub(crate) const CHECK_HELP: &str = "Exit codes: 0 passed, 1 failed, 2 not checked (usage error, unreadable bag, no rule could be evaluated), 3 passed but \
     data was skipped (damaged bag).";
 
-fn check_format(word: &str) -> Result<&'static gate::CheckFormat, String> {
-    gate::CheckFormat::from_word(word).ok_or_else(|| {
-        let words: Vec<&str> = gate::FORMATS.iter().map(|f| f.word).collect();
+fn check_format(word: &str) -> Result<&'static ReportFormat, String> {
+    ReportFormat::from_word(word).ok_or_else(|| {
+        let words: Vec<&str> = FORMATS.iter().map(|f| f.word).collect();
         format!("write one of {}", words.join(", "))
     })
 }
 
-fn diff_format(word: &str) -> Result<&'static gate::DiffFormat, String> {
-    gate::DiffFormat::from_word(word).ok_or_else(|| "write one of text, json, markdown".to_owned())
+fn diff_format(word: &str) -> Result<&'static ReportFormat, String> {
+    let format = ReportFormat::from_word(word).filter(|format| format.differences.is_some());
+    format.ok_or_else(|| "write one of text, json, markdown".to_owned())
 }
 
 /// The formats, for the end of `check --help`.
 pub(crate) fn check_help() -> String {
-    let rows = gate::FORMATS.iter().map(|f| {
+    let rows = FORMATS.iter().map(|f| {
         let ends = f
             .endings
             .first()

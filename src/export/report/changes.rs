@@ -1,8 +1,8 @@
 //! The changes with their times and full names: a row per window, and a row per phase.
 
-use super::escape::plain;
-use super::{MOST_CHANGES, MOST_OPEN, ReportTimes, tables};
+use super::{MOST_CHANGES, MOST_OPEN, ReportTimes, folded_table};
 use crate::base::words;
+use crate::export::markdown::{plain, row};
 use crate::graph::{Element, Elements};
 use crate::mission::Mission;
 use crate::mission::event_log::Kind;
@@ -23,32 +23,27 @@ pub(super) fn phases(mission: &Mission, times: &ReportTimes<'_>) -> String {
     let rows = phases.iter().zip(1..).map(|(phase, n)| {
         let from = times.link(phase.span.start);
         let long = words::duration(phase.span.nanos());
-        format!("| {n} | {from} | {long} | {} |\n", plain(&phase.name))
+        row([n.to_string(), from, long, plain(&phase.name)])
     });
-    let table = tables::table(&["Phase", "From", "For", "Name"], rows, MOST_CHANGES);
     let summary = words::count(phases.len(), "phase");
-    table.map_or(String::new(), |table| tables::folded(&summary, &table))
+    let heads = ["Phase", "From", "For", "Name"];
+    folded_table(&summary, &heads, rows.collect(), MOST_CHANGES)
 }
 
 /// The windows with changes; those beyond the first ones are collapsed.
 pub(super) fn table(mission: &Mission, view: &View, times: &ReportTimes<'_>) -> String {
     let frames = view.frames.iter().filter(|f| !f.headlines.is_empty());
     let rows = frames.map(|frame| {
-        let what = changes_of(mission, frame);
-        format!("| {} | {what} |\n", times.link(frame.span.start))
+        let window = times.link(frame.span.start);
+        row([window, changes_of(mission, frame)])
     });
-    let rows: Vec<String> = rows.collect();
-    let (open, rest) = rows.split_at(rows.len().min(MOST_OPEN));
-    let table = |rows: &[String]| {
-        let heads = ["Window", "Changes"];
-        tables::table(&heads, rows.iter().cloned(), MOST_CHANGES / 2)
-    };
-    let mut out = table(open).map_or(String::new(), |table| table + "\n");
-    if let Some(table) = table(rest) {
-        let summary = format!("{} more with changes", words::count(rest.len(), "window"));
-        out += &tables::folded(&summary, &table);
-    }
-    out
+    let mut open: Vec<String> = rows.collect();
+    let rest = open.split_off(open.len().min(MOST_OPEN));
+    let heads = ["Window", "Changes"];
+    let table = super::table(&heads, open, MOST_CHANGES / 2);
+    let summary = format!("{} more with changes", words::count(rest.len(), "window"));
+    let rest = folded_table(&summary, &heads, rest, MOST_CHANGES / 2);
+    table.map_or(String::new(), |table| table + "\n") + &rest
 }
 
 /// The kinds of headlines that are grouped, with their labels.

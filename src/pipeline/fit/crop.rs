@@ -1,8 +1,9 @@
 //! A page cropped to its graph, if names of a legible size leave it empty.
 
 use crate::base::geometry::Size;
-use crate::draw::picture::{Measured, PageOptions};
-use crate::pipeline::draw::{Composed, Drawing};
+use crate::draw::picture::PageOptions;
+use crate::pipeline::Drawing;
+use crate::pipeline::compose::Composed;
 
 /// The size of names on a page cropped to its graph, in pixels.
 const NAMES: f64 = 15.0;
@@ -18,7 +19,7 @@ const DECORATIONS: (f64, f64) = (1100.0, 0.8);
 /// The page of a medium as high as its graph: paper is no wider or narrower, but need not stay empty.
 pub(super) fn lowered(composed: &Composed, drawing: &Drawing) -> PageOptions {
     let page = &composed.page;
-    let measured = Measured::new(&composed.view, &drawing.style, &drawing.fonts, page.clone());
+    let measured = composed.measured(drawing);
     let graph = composed.layout.size.h * measured.scale(&composed.layout);
     let high = page.size.h - measured.layout_options().page.h + graph;
     PageOptions {
@@ -30,10 +31,11 @@ pub(super) fn lowered(composed: &Composed, drawing: &Drawing) -> PageOptions {
 /// The page cropped to its graph, if names of a legible size leave it empty.
 pub(super) fn cropped(composed: &Composed, drawing: &Drawing) -> PageOptions {
     let (view, page, natural) = (&composed.view, &composed.page, composed.layout.size);
-    let measured =
-        |page: &PageOptions| Measured::new(view, &drawing.style, &drawing.fonts, page.clone());
     let largest = NAMES / drawing.style.node.size;
-    let scale = measured(page).scale(&composed.layout).min(largest);
+    let scale = composed
+        .measured(drawing)
+        .scale(&composed.layout)
+        .min(largest);
     let least = if view.has_time() { LEAST.0 } else { LEAST.1 };
     let wide = (natural.w * scale + 2.0 * AROUND)
         .max(least)
@@ -44,7 +46,12 @@ pub(super) fn cropped(composed: &Composed, drawing: &Drawing) -> PageOptions {
         has_legend: page.has_legend && wide >= LEGEND,
         ..page.clone()
     };
-    let decorations = page.size.h - measured(&cropped).layout_options().page.h;
+    let decorations = page.size.h
+        - drawing
+            .measured(view, cropped.clone())
+            .layout_options()
+            .page
+            .h;
     let high = decorations + natural.h * scale + 1.2 * AROUND;
     cropped.size = Size::new(libm::ceil(wide), libm::ceil(high.max(LEAST.2)));
     if cropped.size.h < page.size.h {

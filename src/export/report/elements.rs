@@ -1,51 +1,18 @@
-//! The tables of a report, cut at a maximum length.
+//! The nodes and topics of a report, and how well they are known.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use super::escape::{code, plain};
+use super::{MOST_TABLE, folded_table};
 use crate::base::time::Stamp;
 use crate::base::words;
 use crate::base::words::count;
 use crate::evidence::Evidence;
-use crate::graph::{Element, Graphs};
+use crate::export::markdown::{code, folded, plain, row};
+use crate::graph::{Element, Existence, Graphs};
 use crate::mission::Mission;
 use crate::mission::info::{how_many, info};
 use crate::view::View;
-
-/// A table of these rows, of at most `most` bytes; a last line states how many rows were cut. `None` without rows.
-pub(super) fn table(
-    heads: &[&str],
-    rows: impl Iterator<Item = String>,
-    most: usize,
-) -> Option<String> {
-    let mut out = format!(
-        "| {} |\n|{}\n",
-        heads.join(" | "),
-        "---|".repeat(heads.len())
-    );
-    let empty = out.len();
-    let mut cut = 0;
-    for row in rows {
-        if cut > 0 || out.len() + row.len() > most {
-            cut += 1;
-        } else {
-            out.push_str(&row);
-        }
-    }
-    if cut > 0 {
-        let _ = writeln!(out, "\n{} more left out.", count(cut, "row"));
-    }
-    (out.len() > empty).then_some(out)
-}
-
-/// Collapsible text.
-pub(super) fn folded(summary: &str, inside: &str) -> String {
-    format!(
-        "<details><summary>{summary}</summary>\n\n{}\n\n</details>\n\n",
-        inside.trim_end()
-    )
-}
 
 /// The number of windows that contain an element, with its messages and the sum of its rates in them.
 #[derive(Default)]
@@ -78,9 +45,9 @@ impl WindowsOf {
     }
 }
 
-fn seen(mission: &Mission, first: Option<Stamp>, last: Option<Stamp>) -> String {
+fn seen(mission: &Mission, seen: &Existence) -> String {
     let at = |t: Stamp| words::offset_seconds(mission.offset(t));
-    match (first, last) {
+    match (seen.first, seen.last) {
         (Some(first), Some(last)) => format!("{} – {}", at(first), at(last)),
         _ => "–".to_owned(),
     }
@@ -101,49 +68,44 @@ fn shown(view: &View) -> BTreeSet<Element> {
 }
 
 /// Every node that is shown.
-pub(super) fn nodes(mission: &Mission, view: &View, most: usize) -> String {
-    let elements = &mission.elements;
+pub(super) fn nodes(mission: &Mission, view: &View) -> String {
     let shown = shown(view);
-    let all = elements.nodes.with_ids();
+    let all = mission.elements.nodes.with_ids();
     let all = all.filter(|(id, _)| shown.contains(&Element::Node(*id)));
-    let nodes = all.clone().count();
     let rows = all.map(|(id, node)| {
         let there = WindowsOf::new(&mission.graphs, Element::Node(id));
-        format!(
-            "| {} | {} | {} | {} | {} |\n",
+        row([
             code(node.name.as_str()),
-            seen(mission, node.seen.first, node.seen.last),
-            there.windows,
+            seen(mission, &node.seen),
+            there.windows.to_string(),
             there.mean(),
-            words(node.seen.evidence)
-        )
+            words(node.seen.evidence),
+        ])
     });
+    let rows: Vec<String> = rows.collect();
     let heads = ["Node", "Seen", "Windows", "Hz sent on average", "Known by"];
-    let summary = count(nodes, "node");
-    table(&heads, rows, most).map_or(String::new(), |table| folded(&summary, &table))
+    folded_table(&count(rows.len(), "node"), &heads, rows, MOST_TABLE)
 }
 
 /// Every topic that is shown.
-pub(super) fn topics(mission: &Mission, view: &View, most: usize) -> String {
-    let elements = &mission.elements;
+pub(super) fn topics(mission: &Mission, view: &View) -> String {
     let shown = shown(view);
-    let all = elements.topics.with_ids();
+    let all = mission.elements.topics.with_ids();
     let all = all.filter(|(id, _)| shown.contains(&Element::Topic(*id)));
-    let topics = all.clone().count();
     let rows = all.map(|(id, topic)| {
         let there = WindowsOf::new(&mission.graphs, Element::Topic(id));
         let types: Vec<String> = topic.types.iter().map(|t| code(t)).collect();
-        format!(
-            "| {} | {} | {} | {} | {} | {} | {} |\n",
+        row([
             code(topic.name.as_str()),
             types.join(", "),
-            seen(mission, topic.seen.first, topic.seen.last),
-            there.windows,
-            there.messages,
+            seen(mission, &topic.seen),
+            there.windows.to_string(),
+            there.messages.to_string(),
             there.mean(),
-            words(topic.seen.evidence)
-        )
+            words(topic.seen.evidence),
+        ])
     });
+    let rows: Vec<String> = rows.collect();
     let heads = [
         "Topic",
         "Type",
@@ -153,8 +115,7 @@ pub(super) fn topics(mission: &Mission, view: &View, most: usize) -> String {
         "Hz on average",
         "Known by",
     ];
-    let summary = count(topics, "topic");
-    table(&heads, rows, most).map_or(String::new(), |table| folded(&summary, &table))
+    folded_table(&count(rows.len(), "topic"), &heads, rows, MOST_TABLE)
 }
 
 /// The strength of the evidence for the graph, as sentences, and the bags.
@@ -190,5 +151,8 @@ pub(super) fn evidence(mission: &Mission) -> String {
             plain(&bag.format)
         );
     }
-    folded("Strength of the evidence", &out)
+    folded(
+        "Strength of the evidence",
+        &(out.trim_end().to_owned() + "\n"),
+    )
 }
