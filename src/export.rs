@@ -1,7 +1,6 @@
 //! Every output format behind one trait. Adding a format is one file below `export/` and one row in [`FORMATS`].
 
 mod animated_svg;
-pub(crate) mod check;
 pub(crate) mod dot;
 pub(crate) mod encoder;
 mod gif;
@@ -110,7 +109,7 @@ pub const FORMATS: &[OutputFormat] = &[
     OutputFormat {
         word: "html",
         what: "a page to step through the mission, in one file",
-        start: html::encoder::start,
+        start: html::start,
         is_unfolded: true,
         ..PICTURE
     },
@@ -197,10 +196,10 @@ impl Output {
 /// the inputs and other files that are read, which are never overwritten.
 ///
 /// # Errors
-/// As [`check::check`], and [`Error::Output`] if a format's requirements are not met.
+/// As [`target::check`], and [`Error::Output`] if a format's requirements are not met.
 pub(crate) fn check(outputs: &[Output], kept: &[PathBuf]) -> Result<()> {
     let targets: Vec<Target> = outputs.iter().flat_map(files).collect();
-    check::check(&targets, kept)?;
+    target::check(&targets, kept)?;
     outputs
         .iter()
         .try_for_each(|o| o.format.check.map_or(Ok(()), |check| check(&o.target)))

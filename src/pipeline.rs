@@ -30,26 +30,24 @@ mod tables;
 mod unfolded;
 mod verify;
 
-#[cfg(feature = "render")]
-pub(crate) use drawing::Medium;
-#[cfg(feature = "render")]
-pub use drawing::{Body, Drawing, Purpose};
-#[cfg(feature = "render")]
-pub use extract::{Extract, Extracted, extract};
-#[cfg(feature = "render")]
-pub use gate::{
-    Baseline, BaselineWritten, Check, Checked, Compared, Diff, Report, baseline, check, diff,
-};
 pub use phases::Phases;
 pub use read::{Reading, explain, read};
 #[cfg(feature = "render")]
-pub use render::{Render, Rendered};
+pub(crate) use {
+    drawing::Medium,
+    render::{render, show},
+};
 #[cfg(feature = "render")]
-pub(crate) use render::{render, show};
-#[cfg(feature = "render")]
-pub use survey::{Survey, is_survey, survey, survey_file};
-#[cfg(feature = "render")]
-pub use tables::{Counted, Counting, Tabled, Tables, count, tables};
+pub use {
+    drawing::{Body, Drawing, Purpose},
+    extract::{Extract, Extracted, extract},
+    gate::{
+        Baseline, BaselineWritten, Check, Checked, Compared, Diff, Report, baseline, check, diff,
+    },
+    render::{Render, Rendered},
+    survey::{Survey, is_survey, survey, survey_file},
+    tables::{Counted, Counting, Tabled, Tables, count, tables},
+};
 #[cfg(feature = "cli")]
 pub(crate) use {
     gate::expectation, read::mission_file, render::check as check_outputs, survey::each,

@@ -4,7 +4,6 @@
 
 pub(crate) mod folder;
 mod mission;
-mod seen;
 pub(crate) mod writer;
 
 use std::io::Write as _;

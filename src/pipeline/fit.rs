@@ -26,10 +26,8 @@ const LARGEST: Size = Size::new(1920.0, 1080.0);
 const FEWEST_STEADY: usize = 3;
 /// The share of the smallest legible text below which changing elements of a namespace are collapsed too.
 const HOPELESS: f64 = 0.3;
-/// The shares of the smallest legible text below which a quarter of the remaining namespaces is collapsed at once, and
-/// two: below 0.75, two at once cost a synthetic mission of 75 nodes four boxes; below 0.7, they cost none of 54 any.
+/// The share of the smallest legible text below which a quarter of the remaining namespaces is collapsed at once.
 const FAR: f64 = 0.5;
-const SMALL: f64 = 0.7;
 
 /// A namespace, and those of its boxes that stay outside when it is collapsed.
 struct Spared {
@@ -283,17 +281,11 @@ impl Fitting<'_> {
         }
     }
 
-    /// How many of so many namespaces are collapsed at once: one; two if the text is too small for one to suffice, or a
-    /// quarter if it is far too small, which saves a layout per namespace.
+    /// How many of so many namespaces are collapsed at once: one, or a quarter if the text is far too small, which saves
+    /// a layout per namespace.
     fn at_once(&self, many: usize) -> usize {
         let share = self.best.text / self.drawing.readable();
-        many.min(if share < FAR {
-            many.div_ceil(4)
-        } else if share < SMALL {
-            2
-        } else {
-            1
-        })
+        if share < FAR { many.div_ceil(4) } else { 1 }
     }
 
     /// The last resort: one box per outermost namespace, and one line for all topics between two boxes, if more

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
-use std::io::Write as _;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::{Body, Drawing, Reading, Render, Watch, read, show};
@@ -11,9 +11,8 @@ use crate::base::error::{Error, Result};
 use crate::base::time::Period;
 use crate::base::{budget, file, words};
 use crate::export::Output;
-use crate::export::check as places;
-use crate::export::sink::OutputSink;
-use crate::export::target::Target;
+use crate::export::sink::write_file;
+use crate::export::target::{self, Target, make_folder};
 use crate::gate::{
     DiffSubject, Difference, Expectation, ReportFormat, Runs, Side, Subject, Verdict, differences,
     judge, pairs, union, update, write,
@@ -150,7 +149,7 @@ pub fn check(job: &Check, watch: &mut dyn Watch) -> Result<Checked> {
     let targets: Vec<Target> = job.reports.iter().map(|r| r.target.clone()).collect();
     let mut kept = job.reading.files();
     kept.push(job.expect.clone());
-    places::check(&targets, &kept)?;
+    target::check(&targets, &kept)?;
     let reading = in_windows(&job.reading, expectation.period);
     let mission = read(&reading, watch)?;
     let mut verdict = judge(&expectation, &mission, is_part(&reading));
@@ -268,7 +267,7 @@ pub fn diff(job: &Diff, watch: &mut dyn Watch) -> Result<Compared> {
     let reports = job.reports.iter().map(|report| report.target.clone());
     let pictures = job.pictures.iter().map(|output| output.target.clone());
     let targets: Vec<Target> = reports.chain(pictures).collect();
-    places::check(&targets, &files(&job.readings))?;
+    target::check(&targets, &files(&job.readings))?;
     let [first, second] = &job.readings;
     let first = read(first, watch)?;
     let second = read(second, watch)?;
@@ -371,7 +370,7 @@ pub fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<BaselineWritten
         Some((path, _)) => Target::Path((*path).to_owned()),
         None => job.output.clone(),
     };
-    places::check(std::slice::from_ref(&target), &kept)?;
+    target::check(std::slice::from_ref(&target), &kept)?;
     let mut period = old.as_ref().and_then(|(_, (_, old))| old.period);
     let mut missions: Vec<Mission> = Vec::new();
     for run in &job.runs {
@@ -415,13 +414,10 @@ fn files(readings: &[Reading]) -> Vec<PathBuf> {
 
 /// Writes a text atomically.
 fn put(target: &Target, text: &str) -> Result<()> {
-    places::make_folder(target)?;
-    let mut sink = OutputSink::create(target, None)?;
-    let failed = sink.error();
-    match sink.write_all(text.as_bytes()) {
-        Ok(()) => sink.commit().map(drop),
+    make_folder(target)?;
+    match write_file(target, text.as_bytes()) {
         // A closed pipe is not an error.
-        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-        Err(error) => Err(failed(error)),
+        Err(Error::Io { source, .. }) if source.kind() == ErrorKind::BrokenPipe => Ok(()),
+        written => written.map(drop),
     }
 }

@@ -28,119 +28,19 @@ const HEADINGS: [(&str, &str); 7] = [
     ("Performance", "skip_existing"),
 ];
 
-/// What `-h` shows of each command: its most important options, and three examples.
-const SCREENS: [(&str, &str, &str); 13] = [
-    (
-        "render",
-        "outputs period start end mode ns_filter topic_filter style size for",
-        "
-  bagreel render run.bag                              an animation of the mission, out/run.gif
-  bagreel render run/ -o run.html --period 10         a page to step through, ten seconds per window
-  bagreel render run.mcap --for readme -o run.gif     wide and legible enough for a README",
-    ),
-    (
-        "figure",
-        "outputs kind width rows text phases start end ns_filter topic_filter",
-        "
-  bagreel figure run.bag -o lives.pdf                 lifelines, as wide as a column
-  bagreel figure run.bag --kind graph -o graph.pdf -o graph.tex   publishers and subscribers, with LaTeX
-  bagreel figure run.bag --kind steps --steps 3,5 -o steps.pdf   how phases 3 and 5 begin",
-    ),
-    (
-        "info",
-        "format why topology source infer",
-        "
-  bagreel info run.bag                                contents, evidence and limits of a bag
-  bagreel info bags/ --format csv                     one row per bag in a folder
-  bagreel info run.bag --why /robot1/planner /robot1/plan   the evidence for an edge",
-    ),
-    (
-        "extract",
-        "output format fields msg_path topic_filter start end",
-        "
-  bagreel extract run.bag -o messages.csv             one row per message
-  bagreel extract run.mcap --fields -o fields/        one table per topic, one column per field
-  bagreel extract run.bag --topic-filter '/robot1/.*' --start 60 -o part.csv   some topics, from 1:00",
-    ),
-    (
-        "tables",
-        "output format period skip_existing",
-        "
-  bagreel tables bags/ -o counts/                     all bags of a folder
-  bagreel tables bags/ -o counts/ --skip-existing     again, for new bags only
-  bagreel tables good.bag run.bag -o counts/ --period 60   two bags, a minute per window",
-    ),
-    (
-        "events",
-        "format parts all phases start end rate_change",
-        "
-  bagreel events run.bag                              one line per event
-  bagreel events run.bag --parts --end 1:00           the first minute, with affected topics
-  bagreel events run.bag --format csv                 for a spreadsheet",
-    ),
-    (
-        "diff",
-        "format outputs rate_change start end",
-        "
-  bagreel diff good.bag run.bag                       what differs, as text
-  bagreel diff good.bag run.bag --format markdown     for a pull request
-  bagreel diff good.bag run.bag -o diff.gif           both missions in one picture",
-    ),
-    (
-        "baseline",
-        "output update only period start end",
-        "
-  bagreel baseline good.bag -o expect.yaml            from one healthy run
-  bagreel baseline good.bag run.bag -o expect.yaml    from several: what they have in common
-  bagreel baseline run.bag --update expect.yaml       after a planned change",
-    ),
-    (
-        "check",
-        "expect format outputs undecidable explain start end",
-        "
-  bagreel check run.bag --expect expect.yaml          print findings; the exit code is 1 if a rule is broken
-  bagreel check run.bag --expect expect.yaml -o check.xml   also write a JUnit report
-  bagreel check --explain topic-rate-low              explain a kind of finding",
-    ),
-    (
-        "follow",
-        "format expect outputs period idle",
-        "
-  bagreel follow run.bag.active                       print events while rosbag records
-  bagreel follow bags/ --expect expect.yaml -o run.html     check the newest recording in a folder
-  bagreel follow run/ --format ndjson                 a rosbag2 folder, events for programs",
-    ),
-    (
-        "styles",
-        "",
-        "
-  bagreel styles                                      list the built-in styles
-  bagreel styles light > own.toml                     begin a style of your own
-  bagreel render run.bag --style dark                 use a style",
-    ),
-    (
-        "completions",
-        "",
-        "
-  bagreel completions bash > ~/.local/share/bash-completion/completions/bagreel
-  bagreel completions zsh > ~/.zfunc/_bagreel
-  bagreel completions fish > ~/.config/fish/completions/bagreel.fish",
-    ),
-    (
-        "man",
-        "",
-        "
-  bagreel man | man -l -                              the page of all commands
-  bagreel man render | man -l -                       the page of one command
-  bagreel man check > bagreel-check.1                 a file to install",
-    ),
-];
+/// What `-h` shows of each command: its most important options, and below them three examples.
+const SCREENS: &str = include_str!("screens.txt");
 
-/// The examples of `bagreel -h`.
-const FIRST: &str = "
-  bagreel render run.bag                              an animation of the mission, out/run.gif
-  bagreel info run.bag                                contents, evidence and limits of a bag
-  bagreel events run.bag                              what started, stopped or changed, and when";
+/// The most important options of a command, and its examples with a line end before each.
+fn screen(command: &str) -> (&'static str, &'static str) {
+    let screens = SCREENS.trim_end().split("\n\n");
+    let mut screens = screens.filter_map(|screen| screen.split_once(':'));
+    let found = screens.find(|(name, _)| *name == command);
+    let (options, examples) = found.map_or(("", ""), |(_, rest)| {
+        rest.split_at(rest.find('\n').unwrap_or(rest.len()))
+    });
+    (options.trim(), examples)
+}
 
 impl Typed {
     /// The command line's grammar with its complete help; `-h` of a command fits one screen.
@@ -149,8 +49,7 @@ impl Typed {
         let command = Self::documented().mut_arg("verbose", hide);
         let command = command.mut_arg("color", hide);
         command.mut_subcommands(|command| {
-            let known = SCREENS.iter().find(|known| known.0 == command.get_name());
-            let essential = known.map_or("", |known| known.1);
+            let (essential, _) = screen(command.get_name());
             command.mut_args(|arg| {
                 let is_essential = essential.split(' ').any(|id| arg.get_id() == id);
                 let is_hidden = !is_essential && !arg.is_positional();
@@ -161,10 +60,10 @@ impl Typed {
 
     /// The command line's grammar, in which no option is left out of short help.
     pub(crate) fn documented() -> Command {
-        let command = examples(Self::command(), FIRST);
+        let command = examples(Self::command(), screen("bagreel").1);
         command.mut_subcommands(|command| {
-            let known = SCREENS.iter().find(|known| known.0 == command.get_name());
-            let command = examples(command, known.map_or("", |known| known.2));
+            let (_, text) = screen(command.get_name());
+            let command = examples(command, text);
             command.mut_args(|arg| {
                 let id = arg.get_id().to_string();
                 let has = |ids: &str| ids.split(' ').any(|known| known == id);

@@ -80,18 +80,13 @@ fn nothing(job: &Extract, lost: &Lost) -> Error {
     if lost.types.is_empty() && is_whole {
         return no_messages(&job.inputs, &lost.notices);
     }
-    let path = job
-        .inputs
-        .first()
-        .map_or_else(String::new, Input::name)
-        .into();
+    let name = job.inputs.first().map_or_else(String::new, Input::name);
     let topics: Vec<&str> = lost.topics.iter().map(TopicName::as_str).collect();
     if let Some(error) = none_pass("--topic-filter", &job.topics, &topics) {
         return error;
     }
     if lost.types.is_empty() {
-        let hint = "`bagreel info` lists its topics and times".to_owned();
-        return Error::NoMessages { path, hint };
+        return Error::no_messages(&name, "`bagreel info` lists its topics and times");
     }
     let types = lost
         .types
@@ -100,7 +95,7 @@ fn nothing(job: &Extract, lost: &Lost) -> Error {
     let types = words::some_of(&types.collect::<Vec<String>>(), MOST_NAMED);
     let what = format!("no message could be decoded; {types}");
     let hint = "`--msg-path DIR` names a folder of `.msg`, `.srv`, `.action` or `.idl` files";
-    Error::unsupported(path, what, hint)
+    Error::unsupported(name, what, hint)
 }
 
 /// What the tables lack: the messages that could not be decoded, their types with a reason each, and notices; and all
