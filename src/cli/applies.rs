@@ -6,7 +6,7 @@ use clap::ArgMatches;
 use clap::parser::ValueSource;
 
 use super::args::Inference;
-use super::args::render::RenderArgs;
+use super::render::RenderArgs;
 use crate::base::error::{Error, Result};
 use crate::export::{OneDrawing, Output};
 use crate::graph::window::Length;

@@ -3,16 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use super::applies::{Given, OF_GRAPHS};
-use super::args::figure::FigureArgs;
-use super::args::render::{LookArgs, ModeWord, SequenceArgs, ViewArgs};
+use super::render::{LookArgs, ModeWord, SequenceArgs, ViewArgs};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
 use crate::base::{budget, file};
-use crate::draw::figure::FigureKind;
 use crate::draw::picture::PageOptions;
 use crate::draw::style::{BUILTIN, Style};
 use crate::draw::text::Fonts;
-use crate::export::options::{self, FigureOptions, SequenceOptions};
+use crate::export::options::{self, SequenceOptions};
 use crate::mission::{Places, read_json};
 use crate::pipeline::Body;
 use crate::view::{Grouping, Hide, Mode, NameFilter, ViewOptions};
@@ -107,34 +105,6 @@ pub(super) fn sequence(args: &SequenceArgs) -> Result<SequenceOptions> {
 /// The summary file of a GitHub job; its name has no extension.
 pub(super) fn summary() -> Option<PathBuf> {
     std::env::var_os("GITHUB_STEP_SUMMARY").map(PathBuf::from)
-}
-
-/// The requested figure, with its width on paper in millimetres.
-pub(super) fn figure(args: &FigureArgs) -> Result<FigureOptions> {
-    let (form, kind) = (&args.form, args.kind);
-    let steps = form.steps.iter().map(|s| usize::from(*s)).collect();
-    if kind != FigureKind::Steps && !form.steps.is_empty() {
-        return Err(Error::usage(
-            format!("`--steps` has no effect on `{}`", kind.word()),
-            "it chooses the panels of `--kind steps`",
-        ));
-    }
-    if kind != FigureKind::Lives && form.rows.is_some() {
-        return Err(Error::usage(
-            format!("`--rows` has no effect on `{}`", kind.word()),
-            "it chooses the rows of `--kind lives`",
-        ));
-    }
-    let default = FigureOptions::default();
-    Ok(FigureOptions {
-        kind,
-        width_mm: args.width.unwrap_or(default.width_mm),
-        text_pt: form.text.unwrap_or(default.text_pt),
-        rows: form.rows,
-        steps,
-        is_bare: args.bare,
-        ..default
-    })
 }
 
 /// The positions from an earlier run's JSON.

@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use terminal_size::{Height, Width, terminal_size_of};
 
-use super::args::{Colour, Typed};
 use super::stop::Stop;
+use super::{Colour, Typed};
 use crate::base::columns::{fitted, hang};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};

@@ -44,7 +44,7 @@ fn screen(command: &str) -> (&'static str, &'static str) {
 
 impl Typed {
     /// The command line's grammar with its complete help; `-h` of a command fits one screen.
-    pub(crate) fn grammar() -> Command {
+    pub(super) fn grammar() -> Command {
         let hide = |arg: clap::Arg| arg.hide_short_help(true);
         let command = Self::documented().mut_arg("verbose", hide);
         let command = command.mut_arg("color", hide);
@@ -59,7 +59,7 @@ impl Typed {
     }
 
     /// The command line's grammar, in which no option is left out of short help.
-    pub(crate) fn documented() -> Command {
+    pub(super) fn documented() -> Command {
         let command = examples(Self::command(), screen("bagreel").1);
         command.mut_subcommands(|command| {
             let (_, text) = screen(command.get_name());
