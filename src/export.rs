@@ -1,4 +1,8 @@
 //! Every output format behind one trait. Adding a format is one file below `export/` and one row in [`FORMATS`].
+//!
+//! In comes a [`Sequence`](sequence::Sequence): a mission, its view, and the drawings of its windows; out come files, each whole
+//! or not at all. Open `encoder` first: what a format is. `run` draws each frame once and passes it to every output;
+//! `target` and `sink` are about files; the other files are formats.
 
 mod animated_svg;
 pub(crate) mod dot;

@@ -2,6 +2,10 @@
 //!
 //! Everything here is based on lifetimes, rates and the event log, never on the difference of two windows. An element
 //! without evidence in the bag is not absent but undecidable, and reported as such.
+//!
+//! In come missions and a `graph.yaml`; out come a [`Verdict`] or [`Difference`]s, and reports of them. Open `facts` first:
+//! what a mission says about a name. `expectation` reads the file, `judge` checks it, `baseline` writes it, `difference`
+//! compares two missions, and `report` has the formats.
 
 mod baseline;
 mod difference;

@@ -1,4 +1,8 @@
 //! The whole program in order: read, divide, build, compare, draw and write.
+//!
+//! In comes the job of a command, such as [`Render`]; out come files and what the command reports. Open `read` first: from
+//! bags to a mission. `render` goes on from there: it decides which picture there is, `fit` chooses what is shown so that it
+//! is legible, `compose` shows and lays out. The other files are the jobs of the other commands.
 
 use crate::base::words::worded;
 mod collect;

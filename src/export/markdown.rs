@@ -64,19 +64,16 @@ pub(crate) fn address(url: &str) -> String {
 }
 
 /// A row of a table.
-pub(crate) fn row<S: AsRef<str>>(cells: impl IntoIterator<Item = S>) -> String {
-    let mut out = String::new();
-    for cell in cells {
-        let blank = if cell.as_ref().is_empty() { "" } else { " " };
-        out.extend(["|", blank, cell.as_ref(), " "]);
-    }
-    out + "|\n"
+pub(crate) fn row<const CELLS: usize>(cells: [String; CELLS]) -> String {
+    format!("| {} |\n", cells.join(" | "))
 }
 
 /// A table of these rows.
 pub(crate) fn table(heads: &[&str], rows: &[String]) -> String {
+    // The column of signs has no head.
+    let heading = format!("| {} |", heads.join(" | ")).replacen("|  |", "| |", 1);
     let rule = "---|".repeat(heads.len());
-    format!("{}|{rule}\n{}", row(heads), rows.concat())
+    format!("{heading}\n|{rule}\n{}", rows.concat())
 }
 
 /// Keeps the first of these parts that have at most `most` bytes together; returns the number of the others.

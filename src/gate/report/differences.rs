@@ -105,26 +105,21 @@ pub(super) fn markdown(subject: &DiffSubject, all: &[Difference]) -> String {
         return out;
     }
     let (known, unknown): (Vec<_>, Vec<_>) = all.iter().partition(|d| d.is_known);
-    out += &table(subject, &known, MOST.saturating_sub(out.len()));
+    if !known.is_empty() {
+        out += &table(subject, &known, MOST.saturating_sub(out.len()));
+        out.push('\n');
+    }
     if !unknown.is_empty() {
         let many = words::count(unknown.len(), "row");
-        let summary = format!("{many} unknown in one of them");
-        let unknown = table(
-            subject,
-            &unknown,
-            MOST.saturating_sub(out.len() + summary.len()),
-        );
-        out += markdown::folded(&summary, unknown.trim_end()).trim_end();
+        let rest = table(subject, &unknown, MOST.saturating_sub(out.len()));
+        out += markdown::folded(&format!("{many} unknown in one of them"), &rest).trim_end();
         out.push('\n');
     }
     out
 }
 
-/// A table of differences, up to `most` bytes; nothing without rows.
+/// A table of differences, up to `most` bytes.
 fn table(subject: &DiffSubject, all: &[&Difference], most: usize) -> String {
-    if all.is_empty() {
-        return String::new();
-    }
     let (first, second) = (code(&subject.first), code(&subject.second));
     let heads = ["", "what", "name", &first, &second];
     let rows = all.iter().map(|one| {
@@ -138,5 +133,5 @@ fn table(subject: &DiffSubject, all: &[&Difference], most: usize) -> String {
         0 => String::new(),
         n => format!("\n{n} more left out.\n"),
     };
-    markdown::table(&heads, &rows) + &left_out + "\n"
+    markdown::table(&heads, &rows) + &left_out
 }

@@ -14,7 +14,7 @@ use crate::base::words;
 use crate::evidence::message::fields::{Decoder, Decoders, KnownTypes};
 use crate::export::tables::TableFormat;
 use crate::export::tables::folder::{Folder, Part, file_stem};
-use crate::export::tables::writer::Writer;
+use crate::export::tables::writer::{Writer, begin};
 use crate::pipeline::Watch;
 use crate::pipeline::collect::no_messages;
 use crate::view::none_pass;
@@ -130,7 +130,7 @@ struct FieldTable {
     rows: u64,
     /// Bytes of the messages in the batch.
     waiting: usize,
-    writer: Option<Writer<BufWriter<Part>>>,
+    writer: Option<Box<dyn Writer<BufWriter<Part>>>>,
 }
 
 const INDEX_COLUMNS: &[ColumnOf<(), FieldTable>] = columns! {
@@ -240,7 +240,7 @@ impl FieldTables {
     }
 
     /// Begins the file of a table under a unique name.
-    fn begin(&mut self, at: usize) -> io::Result<Writer<BufWriter<Part>>> {
+    fn begin(&mut self, at: usize) -> io::Result<Box<dyn Writer<BufWriter<Part>>>> {
         let table = &mut self.all[at];
         let stem = file_stem(&table.topic);
         let mut name = stem.clone();
@@ -252,7 +252,7 @@ impl FieldTables {
         table.file = format!("{name}.{}", self.format.word());
         let part = self.folder.file(table.file.clone());
         let facts = [("topic", table.topic.as_str()), ("type", &table.type_name)];
-        Writer::new(
+        begin(
             self.format,
             BufWriter::with_capacity(1 << 16, part),
             &table.batch,
@@ -263,11 +263,11 @@ impl FieldTables {
     /// Bounds the memory for encoded rows.
     fn unload(&mut self) -> io::Result<()> {
         let writers = || self.all.iter().filter_map(|t| t.writer.as_ref());
-        if writers().map(Writer::held).sum::<usize>() < MOST_HELD_IN_ALL {
+        if writers().map(|writer| writer.held()).sum::<usize>() < MOST_HELD_IN_ALL {
             return Ok(());
         }
         let mut writers = self.all.iter_mut().filter_map(|t| t.writer.as_mut());
-        writers.try_for_each(Writer::unload)
+        writers.try_for_each(|writer| writer.unload())
     }
 
     /// Writes the index of tables and files.
@@ -276,7 +276,7 @@ impl FieldTables {
         tables.sort_by_key(|t| (&t.topic, &t.file));
         let index = Batch::filled(INDEX_COLUMNS, &(), tables);
         let part = self.folder.file(format!("{INDEX}.{}", self.format.word()));
-        let mut writer = Writer::new(self.format, BufWriter::new(part), &index, &[])?;
+        let mut writer = begin(self.format, BufWriter::new(part), &index, &[])?;
         writer.write(&index)?;
         writer.finish()?.into_inner()?;
         Ok(())
