@@ -11,7 +11,6 @@ mod follow;
 mod gate;
 mod help;
 mod installed;
-mod look;
 mod render;
 mod show;
 mod stop;

@@ -2,9 +2,10 @@
 //!
 //! In comes a [`Sequence`](sequence::Sequence): a mission, its view, and the drawings of its windows; out come files, each whole
 //! or not at all. Open `encoder` first: what a format is. `run` draws each frame once and passes it to every output;
-//! `target` and `sink` are about files; the other files are formats.
+//! `target`, `check` and `sink` are about files; the other files are formats.
 
 mod animated_svg;
+pub(crate) mod check;
 pub(crate) mod dot;
 pub(crate) mod encoder;
 mod gif;
@@ -57,7 +58,7 @@ pub const FORMATS: &[OutputFormat] = &[
         what: "a drawing per window with `{n}`, otherwise an animation",
         start: |sequence, target| match sequence.shows(target, OneDrawing::Asked) {
             Shows::Film => animated_svg::start(sequence, target),
-            shows => still::start(sequence, target, StillKind::Svg, shows),
+            shows => Ok(still::start(sequence, target, StillKind::Svg, shows)),
         },
         whole: OneDrawing::Asked,
         takes_together: "frame-ms strip",
@@ -68,7 +69,7 @@ pub const FORMATS: &[OutputFormat] = &[
         what: "an image per window with `{n}`, otherwise a film strip",
         start: |sequence, target| {
             let shows = sequence.shows(target, OneDrawing::Always);
-            still::start(sequence, target, StillKind::Png, shows)
+            Ok(still::start(sequence, target, StillKind::Png, shows))
         },
         ..IMAGE
     },
@@ -77,7 +78,7 @@ pub const FORMATS: &[OutputFormat] = &[
         what: "an image per window with `{n}`, otherwise a film strip",
         start: |sequence, target| {
             let shows = sequence.shows(target, OneDrawing::Always);
-            still::start(sequence, target, StillKind::WebP, shows)
+            Ok(still::start(sequence, target, StillKind::WebP, shows))
         },
         ..IMAGE
     },
@@ -200,10 +201,10 @@ impl Output {
 /// the inputs and other files that are read, which are never overwritten.
 ///
 /// # Errors
-/// As [`target::check`], and [`Error::Output`] if a format's requirements are not met.
+/// As [`check::check`], and [`Error::Output`] if a format's requirements are not met.
 pub(crate) fn check(outputs: &[Output], kept: &[PathBuf]) -> Result<()> {
     let targets: Vec<Target> = outputs.iter().flat_map(files).collect();
-    target::check(&targets, kept)?;
+    check::check(&targets, kept)?;
     outputs
         .iter()
         .try_for_each(|o| o.format.check.map_or(Ok(()), |check| check(&o.target)))

@@ -6,10 +6,8 @@ use clap::ArgMatches;
 use clap::parser::ValueSource;
 
 use super::args::Inference;
-use super::render::RenderArgs;
 use crate::base::error::{Error, Result};
 use crate::export::{OneDrawing, Output};
-use crate::graph::window::Length;
 use crate::pipeline::{Reading, mission_file};
 
 /// The names of the given options, without defaults: `style`, `layout-from`.
@@ -94,8 +92,7 @@ pub(super) fn allows_still(given: &Given, outputs: &[Output]) -> bool {
 }
 
 /// Refuses options that apply to none of the outputs.
-pub(super) fn check_outputs(given: &Given, args: &RenderArgs, outputs: &[Output]) -> Result<()> {
-    let is_one_window = args.time.period == Some(Length::All);
+pub(super) fn check_outputs(given: &Given, is_one_window: bool, outputs: &[Output]) -> Result<()> {
     let applies = |option: &str| {
         let takes = |o: &Output| {
             let is_alone = o.target.is_numbered() || is_one_window;

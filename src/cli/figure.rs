@@ -7,10 +7,10 @@ use clap::Args;
 
 use super::applies::{self, Given};
 use super::args::{GraphArgs, Inputs, PhaseArgs, RangeArgs, RateArgs, reading};
-use super::render::{make_room, outputs, wrote};
+use super::code;
+use super::render::{fonts, make_room, outputs, wrote};
 use super::terminal::Terminal;
 use super::values::{one_of, points, width};
-use super::{code, look};
 use crate::base::error::{Error, Result};
 use crate::base::notice::NoticeKind;
 use crate::draw::figure::{FigureKind, RowKind};
@@ -92,7 +92,7 @@ fn job(args: &FigureArgs) -> Result<Render> {
     let outputs = outputs(&args.outputs, &reading, "pdf", None)?;
     let mut job = Render::new(reading, outputs)?;
     let filter = |text: &Option<String>| NameFilter::parse(text.as_deref().unwrap_or_default());
-    job.drawing.fonts = look::fonts(args.font.as_deref())?;
+    job.drawing.fonts = fonts(args.font.as_deref())?;
     job.drawing.view.ns_filter = filter(&args.ns_filter)?;
     job.drawing.view.topic_filter = filter(&args.topic_filter)?;
     job.drawing.page.rate_change = args.rate.rate_change;

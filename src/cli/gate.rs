@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 
 use super::applies::{self, Given};
 use super::args::{GraphArgs, Inputs, RangeArgs, reading};
-use super::look::summary;
+use super::render::summary;
 use super::terminal::Terminal;
 use super::values::{length, share};
 use super::{DONE, FAILED, SKIPPED, USAGE, code};

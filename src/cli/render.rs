@@ -6,19 +6,27 @@ use std::path::{Path, PathBuf};
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{ArgAction, Args};
 
-use super::applies::{self, Given};
+use super::applies::{self, Given, OF_GRAPHS};
 use super::args::{GraphArgs, Inputs, PhaseArgs, RateArgs, TimeArgs, VerifyArgs, reading};
+use super::code;
 use super::terminal::Terminal;
 use super::values::{bytes, link, one_of, size, width};
-use super::{code, look};
 use crate::bag::Input;
-use crate::base::error::Result;
+use crate::base::error::{Error, Result};
+use crate::base::geometry::Size;
 use crate::base::words::{self, worded};
+use crate::base::{budget, file};
+use crate::draw::picture::PageOptions;
+use crate::draw::style::{BUILTIN, Style};
+use crate::draw::text::Fonts;
+use crate::export::options::{self, SequenceOptions};
 use crate::export::target::Target;
 use crate::export::{FORMATS, Output};
+use crate::graph::window::Length;
 use crate::layout::Orientation;
-use crate::mission::Mission;
-use crate::pipeline::{Drawing, Purpose, Reading, Render, Rendered};
+use crate::mission::{Mission, Places, read_json};
+use crate::pipeline::{Body, Drawing, Purpose, Reading, Render, Rendered};
+use crate::view::{Grouping, Hide, Mode, NameFilter, ViewOptions};
 
 #[derive(Debug, Args)]
 pub(super) struct RenderArgs {
@@ -167,7 +175,8 @@ fn shown(text: &str) -> String {
 /// Reads once and writes every output.
 pub(super) fn render(args: &RenderArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     let job = job(args, given)?;
-    applies::check_outputs(given, args, &job.outputs)?;
+    let is_one_window = args.time.period == Some(Length::All);
+    applies::check_outputs(given, is_one_window, &job.outputs)?;
     if args.view.mode == Some(ModeWord::Topics) {
         applies::check_topics(given, &job.outputs)?;
     }
@@ -198,7 +207,7 @@ pub(super) fn outputs(
         let name = default_output(&reading.inputs, extension);
         return Ok(vec![Output::parse(&name, format)?]);
     }
-    let summary = look::summary();
+    let summary = summary();
     let named = given.iter().map(|output| {
         let is_summary = summary.as_deref() == Some(Path::new(output));
         Output::named(output, format.or(is_summary.then_some("md")))
@@ -254,23 +263,23 @@ fn job(args: &RenderArgs, given: &Given) -> Result<Render> {
     let still = default_output(&reading.inputs, "png");
     let is_still = reading.is_still_if_unchanged && args.outputs.is_empty();
     let drawing = Drawing {
-        body: look::body(args.view.mode, given),
-        view: look::view(&args.view)?,
-        style: look::style(&look.style)?,
-        fonts: look::fonts(look.font.as_deref())?,
-        page: look::page(look, args.rate.rate_change),
+        body: body(args.view.mode, given),
+        view: view(&args.view)?,
+        style: style(&look.style)?,
+        fonts: fonts(look.font.as_deref())?,
+        page: page(look, args.rate.rate_change),
         is_sized: look.size.is_some(),
         medium: None,
         is_fitted: look.fit,
         engine: crate::layout::engine(&look.layout)?,
-        kept: look::kept(look.layout_from.as_deref())?,
+        kept: kept_places(look.layout_from.as_deref())?,
     };
     Ok(Render {
         drawing: match look.purpose {
             Some(purpose) => drawing.seen(purpose),
             None => drawing,
         },
-        sequence: look::sequence(&args.sequence)?,
+        sequence: sequence(&args.sequence)?,
         kept: kept(look),
         outputs,
         still: is_still.then(|| Output::parse(&still, None)).transpose()?,
@@ -295,4 +304,107 @@ fn default_output(inputs: &[Input], extension: &str) -> String {
         stem = stem.strip_suffix(end).unwrap_or(stem);
     }
     format!("out/{}.{extension}", stem.replace('/', "_"))
+}
+
+/// The view options: `rqt_graph`'s defaults or ours, modified by the given options.
+fn view(args: &ViewArgs) -> Result<ViewOptions> {
+    let mut view = if args.rqt_defaults {
+        ViewOptions::rqt_defaults()
+    } else {
+        ViewOptions::default()
+    };
+    match args.mode {
+        Some(ModeWord::Nodes) => view.mode = Mode::Nodes,
+        Some(ModeWord::All) => view.mode = Mode::All,
+        Some(ModeWord::Topics) | None => {}
+    }
+    if let Some(filter) = &args.ns_filter {
+        view.ns_filter = NameFilter::parse(filter)?;
+    }
+    if let Some(filter) = &args.topic_filter {
+        view.topic_filter = NameFilter::parse(filter)?;
+    }
+    if let Some(hide) = &args.hide {
+        view.hide = Hide::parse(hide)?;
+    }
+    if let Some(group) = &args.group {
+        view.group = Grouping::parse(group)?;
+    }
+    for name in &args.collapse {
+        match name.strip_prefix('-') {
+            Some(kept) => view.expand.push(kept.into()),
+            None => view.collapse.push(name.as_str().into()),
+        }
+    }
+    Ok(view)
+}
+
+/// Graph or timeline: as requested, or a graph if an option only applies to a graph.
+fn body(mode: Option<ModeWord>, given: &Given) -> Body {
+    match mode {
+        Some(ModeWord::Topics) => Body::TopicTimeline,
+        None if given.any(OF_GRAPHS).is_none() => Body::Auto,
+        _ => Body::Graph,
+    }
+}
+
+/// A built-in style by its name, else a file.
+fn style(name: &str) -> Result<Style> {
+    let path = Path::new(name);
+    if BUILTIN.iter().any(|row| row.0 == name) || !path.exists() {
+        return Style::builtin(name);
+    }
+    let text = file::read_text(path, budget::USER_TEXT)?;
+    Style::from_toml(&text, path)
+}
+
+/// The bundled font, with the user's font file for characters that it lacks.
+pub(super) fn fonts(file: Option<&Path>) -> Result<Fonts> {
+    let Some(path) = file else {
+        return Ok(Fonts::bundled());
+    };
+    let data = file::read(path, budget::FONT)?;
+    Fonts::bundled().with(data, path)
+}
+
+fn page(args: &LookArgs, rate_change: f64) -> PageOptions {
+    let default = PageOptions::default();
+    let size = args.size.map(|(w, h)| Size::new(w.into(), h.into()));
+    PageOptions {
+        size: size.unwrap_or(default.size),
+        width_mm: args.width,
+        bare: args.bare,
+        title: args.title.clone(),
+        orientation: args.orientation,
+        rate_change,
+        ..default
+    }
+}
+
+fn sequence(args: &SequenceArgs) -> Result<SequenceOptions> {
+    let strip = args.strip.as_deref().map(options::Choice::parse);
+    Ok(SequenceOptions {
+        frame_ms: args.frame_ms,
+        max_bytes: args.max_bytes,
+        strip: strip.transpose()?,
+        links: args.link.clone(),
+        append_to: summary(),
+        ..SequenceOptions::default()
+    })
+}
+
+/// The summary file of a GitHub job; its name has no extension.
+pub(super) fn summary() -> Option<PathBuf> {
+    std::env::var_os("GITHUB_STEP_SUMMARY").map(PathBuf::from)
+}
+
+/// The positions from an earlier run's JSON.
+fn kept_places(file: Option<&Path>) -> Result<Option<Places>> {
+    let Some(path) = file else { return Ok(None) };
+    let text = file::read_text(path, budget::MISSION_JSON)?;
+    let places = read_json(&text, path)?.layout;
+    places.map(Some).ok_or_else(|| {
+        let hint = "write it beside a picture: `bagreel render BAG -o x.gif -o x.json`";
+        Error::bad_file(path, 0, "it contains no layout", hint)
+    })
 }

@@ -64,7 +64,7 @@ pub(crate) fn address(url: &str) -> String {
 }
 
 /// A row of a table.
-pub(crate) fn row<const CELLS: usize>(cells: [String; CELLS]) -> String {
+pub(crate) fn row(cells: &[String]) -> String {
     format!("| {} |\n", cells.join(" | "))
 }
 

@@ -20,8 +20,9 @@ use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use ::parquet::schema::types::{ColumnPath, Type, TypePtr};
 
 use crate::base::cast::to_f32;
-use crate::base::table::{Batch, ColumnKind, ColumnValues, TableColumn, TextColumn, span};
-use crate::export::tables::writer::Writer;
+use crate::base::table::{
+    Batch, ColumnKind, ColumnValues, TableColumn, TableWriter, TextColumn, span,
+};
 
 /// The most rows in a group, as in other writers.
 const MOST_ROWS: usize = 1 << 20;
@@ -71,7 +72,7 @@ impl<W: Write + Send> Rows<W> {
     }
 }
 
-impl<W: Write + Send> Writer<W> for Rows<W> {
+impl<W: Write + Send> TableWriter<W> for Rows<W> {
     fn write(&mut self, batch: &Batch) -> io::Result<()> {
         if batch.rows == 0 {
             return Ok(());

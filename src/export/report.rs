@@ -203,7 +203,7 @@ fn phases(mission: &Mission, times: &ReportTimes<'_>) -> String {
     let rows = phases.iter().zip(1..).map(|(phase, n)| {
         let from = times.link(phase.span.start);
         let long = words::duration(phase.span.nanos());
-        row([n.to_string(), from, long, plain(&phase.name)])
+        row(&[n.to_string(), from, long, plain(&phase.name)])
     });
     let summary = words::count(phases.len(), "phase");
     let heads = ["Phase", "From", "For", "Name"];
@@ -215,7 +215,7 @@ fn changes(mission: &Mission, view: &View, times: &ReportTimes<'_>) -> String {
     let frames = view.frames.iter().filter(|f| !f.headlines.is_empty());
     let rows = frames.map(|frame| {
         let window = times.link(frame.span.start);
-        row([window, changes_of(mission, frame)])
+        row(&[window, changes_of(mission, frame)])
     });
     let mut open: Vec<String> = rows.collect();
     let rest = open.split_off(open.len().min(MOST_OPEN));
@@ -338,7 +338,7 @@ fn nodes(mission: &Mission, view: &View) -> String {
     let all = all.filter(|(id, _)| shown.contains(&Element::Node(*id)));
     let rows = all.map(|(id, node)| {
         let there = WindowsOf::new(&mission.graphs, Element::Node(id));
-        row([
+        row(&[
             code(node.name.as_str()),
             seen(mission, &node.seen),
             there.windows.to_string(),
@@ -359,7 +359,7 @@ fn topics(mission: &Mission, view: &View) -> String {
     let rows = all.map(|(id, topic)| {
         let there = WindowsOf::new(&mission.graphs, Element::Topic(id));
         let types: Vec<String> = topic.types.iter().map(|t| code(t)).collect();
-        row([
+        row(&[
             code(topic.name.as_str()),
             types.join(", "),
             seen(mission, &topic.seen),

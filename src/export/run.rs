@@ -11,9 +11,9 @@ use rayon::prelude::*;
 
 use self::raster_pool::{FrameWant, Packed, RasterPool};
 use crate::base::error::{Error, Result};
+use crate::export::check::make_folder;
 use crate::export::palette::Palette;
 use crate::export::sequence::{FrameTime, Sequence};
-use crate::export::target::make_folder;
 use crate::export::{Encoder, Needs, Output, Packet, Written};
 
 /// A function called after every batch of frames with the number of frames done and their total. It may cancel the run.

@@ -4,7 +4,7 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder as _};
 
-use super::{DrawnFrame, Encoder, Needs, Pack, Packet, Started, Written};
+use super::{DrawnFrame, Encoder, Needs, Pack, Packet, Written};
 use crate::base::error::{Error, Result};
 use crate::draw::paint::raster::Pixels;
 use crate::draw::paint::svg;
@@ -40,8 +40,8 @@ pub(crate) fn start<'a>(
     target: &Target,
     kind: StillKind,
     shows: Shows<'a>,
-) -> Started<'a> {
-    Ok(Box::new(Images {
+) -> Box<dyn Encoder + 'a> {
+    Box::new(Images {
         kind,
         sequence,
         strip: match shows {
@@ -51,7 +51,7 @@ pub(crate) fn start<'a>(
         target: target.clone(),
         windows: sequence.view.frames.len(),
         written: Written::to(target),
-    }))
+    })
 }
 
 impl Images<'_> {

@@ -11,8 +11,9 @@ use crate::base::error::{Error, Result};
 use crate::base::time::Period;
 use crate::base::{budget, file, words};
 use crate::export::Output;
+use crate::export::check::{check as check_targets, make_folder};
 use crate::export::sink::write_file;
-use crate::export::target::{self, Target, make_folder};
+use crate::export::target::Target;
 use crate::gate::{
     DiffSubject, Difference, Expectation, ReportFormat, Runs, Side, Subject, Verdict, differences,
     judge, pairs, union, update, write,
@@ -149,7 +150,7 @@ pub fn check(job: &Check, watch: &mut dyn Watch) -> Result<Checked> {
     let targets: Vec<Target> = job.reports.iter().map(|r| r.target.clone()).collect();
     let mut kept = job.reading.files();
     kept.push(job.expect.clone());
-    target::check(&targets, &kept)?;
+    check_targets(&targets, &kept)?;
     let reading = in_windows(&job.reading, expectation.period);
     let mission = read(&reading, watch)?;
     let mut verdict = judge(&expectation, &mission, is_part(&reading));
@@ -267,7 +268,7 @@ pub fn diff(job: &Diff, watch: &mut dyn Watch) -> Result<Compared> {
     let reports = job.reports.iter().map(|report| report.target.clone());
     let pictures = job.pictures.iter().map(|output| output.target.clone());
     let targets: Vec<Target> = reports.chain(pictures).collect();
-    target::check(&targets, &files(&job.readings))?;
+    check_targets(&targets, &files(&job.readings))?;
     let [first, second] = &job.readings;
     let first = read(first, watch)?;
     let second = read(second, watch)?;
@@ -370,7 +371,7 @@ pub fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<BaselineWritten
         Some((path, _)) => Target::Path((*path).to_owned()),
         None => job.output.clone(),
     };
-    target::check(std::slice::from_ref(&target), &kept)?;
+    check_targets(std::slice::from_ref(&target), &kept)?;
     let mut period = old.as_ref().and_then(|(_, (_, old))| old.period);
     let mut missions: Vec<Mission> = Vec::new();
     for run in &job.runs {

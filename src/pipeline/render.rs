@@ -146,9 +146,9 @@ pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) ->
         notices.extend(more);
     }
     Ok(Rendered {
+        mission,
         notices,
         written,
-        mission,
     })
 }
 

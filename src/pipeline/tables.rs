@@ -17,9 +17,10 @@ use crate::bag::Recording;
 use crate::base::error::{Error, Result};
 use crate::base::file::with_suffix;
 use crate::base::notice::{Notice, NoticeKind, Notices};
+use crate::export::check::make_folder;
 use crate::export::sink::write_file;
 use crate::export::tables::{TableFormat, writer};
-use crate::export::target::{Target, make_folder, resolved};
+use crate::export::target::{Target, resolved};
 pub use count::{Counted, Counting, count};
 
 /// The whole job of `bagreel tables`.

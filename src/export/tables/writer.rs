@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::base::csv;
 use crate::base::error::{Error, Result};
-use crate::base::table::Batch;
+use crate::base::table::{Batch, TableWriter};
 use crate::base::words::worded;
 #[cfg(feature = "parquet")]
 use crate::export::parquet;
@@ -53,32 +53,13 @@ pub(crate) fn whole(format: TableFormat, table: &Batch) -> Result<Vec<u8>> {
     write().map_err(Error::io("write", Path::new("-")))
 }
 
-/// A table in progress.
-pub(crate) trait Writer<W> {
-    /// Writes all rows of `batch`, which must have the table's columns.
-    fn write(&mut self, batch: &Batch) -> io::Result<()>;
-
-    /// The number of bytes of encoded rows in memory.
-    fn held(&self) -> usize {
-        0
-    }
-
-    /// Writes the rows in memory.
-    fn unload(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-
-    /// Ends the table and returns the sink that it was written to.
-    fn finish(self: Box<Self>) -> io::Result<W>;
-}
-
 /// Begins a table with the columns of `batch`; `facts` about it are stored if the format supports it.
 pub(crate) fn begin<'a, W: Write + Send + 'a>(
     format: TableFormat,
     to: W,
     batch: &Batch,
     facts: &[(&str, &str)],
-) -> io::Result<Box<dyn Writer<W> + 'a>> {
+) -> io::Result<Box<dyn TableWriter<W> + 'a>> {
     let _ = facts;
     Ok(match format {
         TableFormat::Csv => Box::new(csv::CsvRows::new(to, batch)?),
@@ -87,14 +68,4 @@ pub(crate) fn begin<'a, W: Write + Send + 'a>(
         #[cfg(not(feature = "parquet"))]
         TableFormat::Parquet => return Err(io::Error::other(NO_PARQUET)),
     })
-}
-
-impl<W: Write> Writer<W> for csv::CsvRows<W> {
-    fn write(&mut self, batch: &Batch) -> io::Result<()> {
-        Self::write(self, batch)
-    }
-
-    fn finish(self: Box<Self>) -> io::Result<W> {
-        Self::finish(*self)
-    }
 }

@@ -125,7 +125,7 @@ fn table(subject: &DiffSubject, all: &[&Difference], most: usize) -> String {
     let rows = all.iter().map(|one| {
         let [first, second] = [&one.first, &one.second].map(|value| cell(value, plain));
         let (sign, name) = (sign(one).to_string(), code(&one.name));
-        row([sign, one.kind.to_owned(), name, first, second])
+        row(&[sign, one.kind.to_owned(), name, first, second])
     });
     let mut rows: Vec<String> = rows.collect();
     let cut = markdown::cut(&mut rows, most);

@@ -139,7 +139,7 @@ fn finding_row(facts: &Facts<'_>, finding: &Finding, is_alone: bool) -> String {
     let word = finding.kind.word();
     let short = word.strip_prefix("node-").or(word.strip_prefix("topic-"));
     let what = short.unwrap_or(word).replace('-', " ");
-    row([
+    row(&[
         sign.to_owned(),
         format!("{} {what}", code(&finding.name)),
         when + &since,

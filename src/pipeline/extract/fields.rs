@@ -8,13 +8,15 @@ use crate::bag::{Connection, ConnectionId, Input, Message, Sink, Want};
 use crate::base::error::{Error, Result};
 use crate::base::name::{NodeName, TopicName};
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::table::{Batch, ColumnKind, ColumnOf, TableCell, TableColumn, columns};
+use crate::base::table::{
+    Batch, ColumnKind, ColumnOf, TableCell, TableColumn, TableWriter, columns,
+};
 use crate::base::time::Stamp;
 use crate::base::words;
 use crate::evidence::message::fields::{Decoder, Decoders, KnownTypes};
 use crate::export::tables::TableFormat;
 use crate::export::tables::folder::{Folder, Part, file_stem};
-use crate::export::tables::writer::{Writer, begin};
+use crate::export::tables::writer::begin;
 use crate::pipeline::Watch;
 use crate::pipeline::collect::no_messages;
 use crate::view::none_pass;
@@ -130,7 +132,7 @@ struct FieldTable {
     rows: u64,
     /// Bytes of the messages in the batch.
     waiting: usize,
-    writer: Option<Box<dyn Writer<BufWriter<Part>>>>,
+    writer: Option<Box<dyn TableWriter<BufWriter<Part>>>>,
 }
 
 const INDEX_COLUMNS: &[ColumnOf<(), FieldTable>] = columns! {
@@ -240,7 +242,7 @@ impl FieldTables {
     }
 
     /// Begins the file of a table under a unique name.
-    fn begin(&mut self, at: usize) -> io::Result<Box<dyn Writer<BufWriter<Part>>>> {
+    fn begin(&mut self, at: usize) -> io::Result<Box<dyn TableWriter<BufWriter<Part>>>> {
         let table = &mut self.all[at];
         let stem = file_stem(&table.topic);
         let mut name = stem.clone();
