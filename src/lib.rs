@@ -123,6 +123,7 @@ pub mod values {
     //! The types used by those of the front page: times and names, the elements of a graph, the events of a
     //! log, and options.
 
+    pub use crate::base::error::Fault;
     pub use crate::base::name::{NodeName, TopicName};
     pub use crate::base::notice::{Notice, NoticeKind, Notices};
     pub use crate::base::time::{Moment, Period, Span, Stamp};

@@ -103,8 +103,8 @@ pub trait Encoder: Send {
     /// Begins, before the first packet, with the size of all frames and their palette.
     ///
     /// # Errors
-    /// [`Error::Io`] with the output's path if it cannot be written; [`Error::Output`] if the format cannot represent
-    /// it.
+    /// [`Error::Io`](crate::base::error::Error::Io) with the output's path if it cannot be written, or an error of output
+    /// if the format cannot represent it.
     fn begin(&mut self, _size: (u32, u32), _palette: &Palette) -> Result<()> {
         Ok(())
     }
@@ -112,7 +112,7 @@ pub trait Encoder: Send {
     /// Takes the packet of the next frame. `index` is the number of its window in the mission.
     ///
     /// # Errors
-    /// [`Error::Io`] with the output's path if it cannot be written.
+    /// [`Error::Io`](crate::base::error::Error::Io) with the output's path if it cannot be written.
     fn take(&mut self, _index: usize, _frame_time: FrameTime, _packet: Packet) -> Result<()> {
         Ok(())
     }
@@ -146,7 +146,7 @@ pub(crate) fn at_end<'a>(
 /// Begins an output of one file that takes no frames; `write` returns remarks for the user.
 ///
 /// # Errors
-/// [`Error::Usage`] with the reason for a name with `{n}`.
+/// [`Error::Usage`](crate::base::error::Error::Usage) with the reason for a name with `{n}`.
 pub(crate) fn one_file<'a>(
     target: &Target,
     reason: &str,
@@ -166,7 +166,7 @@ pub(crate) fn one_file<'a>(
 /// Begins an output of one text.
 ///
 /// # Errors
-/// [`Error::Usage`] for a name with `{n}`.
+/// [`Error::Usage`](crate::base::error::Error::Usage) for a name with `{n}`.
 pub(crate) fn one_text<'a>(
     target: &Target,
     text: impl FnOnce() -> String + Send + 'a,
