@@ -1,5 +1,8 @@
 //! The types and helpers that all other modules share: times, names, errors, notices, points, and the small formats
 //! around them.
+//!
+//! Nothing comes in; out come types without knowledge of robots. Open `time` and `error` first, then `words`, through which
+//! everything that people read goes.
 
 pub(crate) mod budget;
 pub(crate) mod cast;

@@ -1,31 +1,118 @@
 //! The command line; only this file and its folder use clap and the environment.
+//!
+//! In come the arguments of the program; out come an exit code, and what a person reads. Each command is a file: its
+//! arguments, the job for the pipeline that they are, and what it prints. Open `render` first; `args` has what commands share,
+//! `applies` refuses options without effect.
 
 mod applies;
 mod args;
+mod figure;
 mod follow;
 mod gate;
+mod help;
 mod installed;
-mod look;
-mod reading;
 mod render;
 mod show;
 mod stop;
 mod tables;
 pub(crate) mod terminal;
+mod values;
 
 use std::ffi::OsString;
 use std::io::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, ValueEnum as _};
+use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, ValueEnum};
 
 use crate::base::error::Error;
 use crate::base::words::visible;
 use crate::cli::terminal::{Terminal, has_colour, print_usage};
 use crate::mission::Mission;
 use applies::Given;
-use args::{Colour, Command, Typed};
+
+/// The version, and in packages the commit that they were built from: `0.1.0 (1a2b3c4d5e 2026-11-23)`.
+const VERSION: &str = match option_env!("BAGREEL_VERSION") {
+    Some(named) => named,
+    None => env!("CARGO_PKG_VERSION"),
+};
+
+/// See how a robot's software reconfigures during a mission, straight from its bag files.
+#[derive(Debug, Parser)]
+#[command(name = "bagreel", version = VERSION, max_term_width = 100)]
+#[command(
+    after_help = "Exit codes: 0 done, 1 failed, 2 usage error, 3 done but data was skipped (damaged bag)."
+)]
+struct Typed {
+    #[command(subcommand)]
+    command: Command,
+    /// Only print errors.
+    #[arg(long, short, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Print every note, not a summary of what was left out or chosen.
+    #[arg(long, short, global = true)]
+    verbose: bool,
+    /// When to use colors. `auto`: on a terminal, unless `NO_COLOR` is set.
+    #[arg(long, global = true, value_enum, default_value_t, value_name = "WHEN")]
+    color: Colour,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "lower")]
+enum Colour {
+    #[default]
+    Auto,
+    Always,
+    Never,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Draw a mission: animations, frames, pages, figures and data, from one pass over the bag.
+    #[command(after_long_help = render::outputs_help())]
+    Render(Box<render::RenderArgs>),
+    /// Draw a figure for a paper: when each node ran, who publishes to whom, or the reconfigurations one by
+    /// one.
+    Figure(Box<figure::FigureArgs>),
+    /// Summarize a bag: contents, evidence, and what it cannot tell you; for a folder, one row per bag.
+    Info(Box<show::InfoArgs>),
+    /// Export messages as tables: a row per message, or a table per topic with every field.
+    #[command(after_long_help = tables::EXTRACT_HELP)]
+    Extract(Box<tables::ExtractArgs>),
+    /// Count the messages of many bags per publisher, topic and window: a table per bag.
+    #[command(after_long_help = tables::HELP)]
+    Tables(Box<tables::TablesArgs>),
+    /// Print the event log: what started, stopped, restarted, changed rate or was taken over, and when; for a folder, the logs
+    /// of its bags.
+    Events(Box<show::EventsArgs>),
+    /// Compare two missions: nodes, topics, connections, rates and events.
+    #[command(after_long_help = gate::DIFF_HELP)]
+    Diff(Box<gate::DiffArgs>),
+    /// Generate an expectations file from healthy runs.
+    #[command(after_long_help = gate::BASELINE_HELP)]
+    Baseline(Box<gate::BaselineArgs>),
+    /// Check a mission against an expectations file: what is missing, new, late or slow.
+    #[command(after_long_help = gate::check_help())]
+    Check(Box<gate::CheckArgs>),
+    /// Follow a recording while it grows: print each event as soon as it is known, without ROS and without locks.
+    #[command(after_long_help = follow::HELP)]
+    Follow(Box<follow::FollowArgs>),
+    /// List the built-in styles, or print one as a starting point for your own.
+    Styles {
+        /// The style to print as TOML.
+        name: Option<String>,
+    },
+    /// Print completions for a shell.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page, or that of one command.
+    Man {
+        /// The command.
+        command: Option<String>,
+    },
+}
 
 const DONE: u8 = 0;
 const FAILED: u8 = 1;
@@ -61,7 +148,7 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
     let mut failed = FAILED;
     let outcome = match typed.command {
         Command::Render(args) => render::render(&args, &given, &mut terminal),
-        Command::Figure(args) => render::figure(&args, &given, &mut terminal),
+        Command::Figure(args) => figure::figure(&args, &given, &mut terminal),
         Command::Info(args) => show::info(&args, &given, &mut terminal),
         Command::Extract(args) => tables::extract(&args, &mut terminal),
         Command::Tables(args) => tables::tables(&args, &mut terminal),

@@ -1,4 +1,8 @@
 //! Every output format behind one trait. Adding a format is one file below `export/` and one row in [`FORMATS`].
+//!
+//! In comes a [`Sequence`](sequence::Sequence): a mission, its view, and the drawings of its windows; out come files, each whole
+//! or not at all. Open `encoder` first: what a format is. `run` draws each frame once and passes it to every output;
+//! `target`, `check` and `sink` are about files; the other files are formats.
 
 mod animated_svg;
 pub(crate) mod check;
@@ -7,6 +11,7 @@ pub(crate) mod encoder;
 mod gif;
 pub(crate) mod html;
 mod json;
+pub(crate) mod markdown;
 pub(crate) mod mermaid;
 pub mod options;
 pub(crate) mod palette;
@@ -33,9 +38,8 @@ pub(crate) use encoder::Pack;
 pub use encoder::Written;
 use encoder::{DATA, GRAPH, IMAGE, LOOK, PICTURE, WORDS};
 pub use encoder::{DrawnFrame, Encoder, Needs, OneDrawing, OutputFormat, Packet};
-pub(crate) use encoder::{Single, single};
 pub(crate) use encoder::{Started, at_end, one_file, one_text, text_per_window};
-use sequence::Sequence;
+use sequence::Shows;
 use tables::TableFormat;
 use target::Target;
 pub(crate) use tex::needs_figure;
@@ -52,7 +56,10 @@ pub const FORMATS: &[OutputFormat] = &[
     OutputFormat {
         word: "svg",
         what: "a drawing per window with `{n}`, otherwise an animation",
-        start: start_svg,
+        start: |sequence, target| match sequence.shows(target, OneDrawing::Asked) {
+            Shows::Film => animated_svg::start(sequence, target),
+            shows => Ok(still::start(sequence, target, StillKind::Svg, shows)),
+        },
         whole: OneDrawing::Asked,
         takes_together: "frame-ms strip",
         ..IMAGE
@@ -60,13 +67,19 @@ pub const FORMATS: &[OutputFormat] = &[
     OutputFormat {
         word: "png",
         what: "an image per window with `{n}`, otherwise a film strip",
-        start: |sequence, target| still::start(sequence, target, StillKind::Png),
+        start: |sequence, target| {
+            let shows = sequence.shows(target, OneDrawing::Always);
+            Ok(still::start(sequence, target, StillKind::Png, shows))
+        },
         ..IMAGE
     },
     OutputFormat {
         word: "webp",
         what: "an image per window with `{n}`, otherwise a film strip",
-        start: |sequence, target| still::start(sequence, target, StillKind::WebP),
+        start: |sequence, target| {
+            let shows = sequence.shows(target, OneDrawing::Always);
+            Ok(still::start(sequence, target, StillKind::WebP, shows))
+        },
         ..IMAGE
     },
     OutputFormat {
@@ -78,7 +91,7 @@ pub const FORMATS: &[OutputFormat] = &[
     OutputFormat {
         word: "mmd",
         what: "a Mermaid flow chart",
-        start: mermaid::encoder::start,
+        start: mermaid::start,
         ..GRAPH
     },
     #[cfg(feature = "pdf")]
@@ -101,14 +114,14 @@ pub const FORMATS: &[OutputFormat] = &[
     OutputFormat {
         word: "html",
         what: "a page to step through the mission, in one file",
-        start: html::encoder::start,
+        start: html::start,
         is_unfolded: true,
         ..PICTURE
     },
     OutputFormat {
         word: "md",
         what: "a report for a pull request or a job summary",
-        start: report::encoder::start,
+        start: report::start,
         is_unfolded: true,
         takes: &[WORDS, "link"],
         ..PICTURE
@@ -138,16 +151,6 @@ pub const FORMATS: &[OutputFormat] = &[
         ..DATA
     },
 ];
-
-/// Begins SVG: single drawings if requested, otherwise an animation.
-fn start_svg<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Result<Box<dyn Encoder + 'a>> {
-    let is_sequence = sequence.view.frames.len() > 1 && !sequence.options.is_one_drawing();
-    if is_sequence && !target.is_numbered() {
-        animated_svg::start(sequence, target)
-    } else {
-        still::start(sequence, target, StillKind::Svg)
-    }
-}
 
 /// One output: its format and its target.
 #[derive(Clone, Debug)]

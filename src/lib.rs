@@ -123,6 +123,7 @@ pub mod values {
     //! The types used by those of the front page: times and names, the elements of a graph, the events of a
     //! log, and options.
 
+    pub use crate::base::error::Fault;
     pub use crate::base::name::{NodeName, TopicName};
     pub use crate::base::notice::{Notice, NoticeKind, Notices};
     pub use crate::base::time::{Moment, Period, Span, Stamp};
@@ -159,8 +160,8 @@ pub mod values {
         export::tables::TableFormat,
         export::target::Target,
         gate::{
-            Cause, CheckFormat, CheckedFact, DiffFormat, DiffSubject, Difference, Finding,
-            FindingKind, Judgement, Severity, Verdict, Where,
+            Cause, CheckedFact, DiffSubject, Difference, Finding, FindingKind, Judgement,
+            ReportFormat, Severity, Verdict, Where,
         },
         layout::{Engine, Orientation},
         pipeline::{Body, Drawing, Purpose},

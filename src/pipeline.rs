@@ -1,11 +1,15 @@
 //! The whole program in order: read, divide, build, compare, draw and write.
+//!
+//! In comes the job of a command, such as [`Render`]; out come files and what the command reports. Open `read` first: from
+//! bags to a mission. `render` goes on from there: it decides which picture there is, `fit` chooses what is shown so that it
+//! is legible, `compose` shows and lays out. The other files are the jobs of the other commands.
 
 use crate::base::words::worded;
 mod collect;
 #[cfg(feature = "render")]
-mod draw;
+mod compose;
 #[cfg(feature = "render")]
-mod export;
+mod drawing;
 #[cfg(feature = "render")]
 mod extract;
 #[cfg(feature = "render")]
@@ -19,9 +23,9 @@ mod gate;
 mod inputs;
 mod phases;
 mod probe;
-#[cfg(feature = "render")]
-mod purpose;
 mod read;
+#[cfg(feature = "render")]
+mod render;
 #[cfg(feature = "render")]
 mod survey;
 #[cfg(feature = "render")]
@@ -30,31 +34,27 @@ mod tables;
 mod unfolded;
 mod verify;
 
-#[cfg(feature = "render")]
-pub use draw::{Body, Drawing};
-#[cfg(feature = "render")]
-pub use export::{Render, Rendered};
-#[cfg(feature = "render")]
-pub(crate) use export::{render, show};
-#[cfg(feature = "render")]
-pub use extract::{Extract, Extracted, extract};
-#[cfg(feature = "render")]
-pub use gate::{
-    Baseline, BaselineWritten, Check, Checked, Compared, Diff, Report, baseline, check, diff,
-};
 pub use phases::Phases;
-#[cfg(feature = "render")]
-pub(crate) use purpose::Medium;
-#[cfg(feature = "render")]
-pub use purpose::Purpose;
 pub use read::{Reading, explain, read};
 #[cfg(feature = "render")]
-pub use survey::{Survey, is_survey, survey, survey_file};
+pub(crate) use {
+    drawing::Medium,
+    render::{render, show},
+};
 #[cfg(feature = "render")]
-pub use tables::{Counted, Counting, Tabled, Tables, count, tables};
+pub use {
+    drawing::{Body, Drawing, Purpose},
+    extract::{Extract, Extracted, extract},
+    gate::{
+        Baseline, BaselineWritten, Check, Checked, Compared, Diff, Report, baseline, check, diff,
+    },
+    render::{Render, Rendered},
+    survey::{Survey, is_survey, survey, survey_file},
+    tables::{Counted, Counting, Tabled, Tables, count, tables},
+};
 #[cfg(feature = "cli")]
 pub(crate) use {
-    export::check as check_outputs, gate::expectation, read::mission_file, survey::each,
+    gate::expectation, read::mission_file, render::check as check_outputs, survey::each,
 };
 
 worded! {

@@ -451,7 +451,7 @@ const SPELLINGS: &[(&str, &[&str])] = &[
     // An invisible character; names of characters that the font lacks are reported in a note.
     ("escape_unicode", &["draw/picture"]),
     // A shortened name. Labels are cut by their width in the font, not by characters.
-    ("'…'", &["draw/text", "export/report/escape"]),
+    ("'…'", &["draw/text", "export/markdown"]),
     ("}…\"", &[]),
 ];
 

@@ -6,8 +6,8 @@ use std::process::Command;
 
 use bagreel::commands::{Baseline, Check, Diff, Report, baseline, check, diff};
 use bagreel::values::{
-    CheckFormat, DiffFormat, FindingKind, Fonts, Judgement, Severity, SourceCode, Target,
-    Unwatched, Where, topology,
+    FindingKind, Fonts, Judgement, ReportFormat, Severity, SourceCode, Target, Unwatched, Where,
+    topology,
 };
 use bagreel::{Error, Mission, Output, Reading, Render, read, render};
 
@@ -114,7 +114,7 @@ fn a_program_writes_a_baseline_and_checks_missions_against_it() {
     let args = "check courier.mcap --expect graph.yaml --format json";
     let told = bagreel(folder.path(), &args.split(' ').collect::<Vec<_>>());
     assert_eq!(told.status.code(), Some(1));
-    let json = CheckFormat::from_word("json").unwrap();
+    let json = ReportFormat::from_word("json").unwrap();
     assert_eq!(job.report(&done, json), text(&told.stdout));
 
     assert!(matches!(
@@ -159,8 +159,8 @@ fn a_program_compares_two_missions() {
 
     let args = "diff courier.mcap warehouse.bag --format json";
     let told = bagreel(&project("examples"), &args.split(' ').collect::<Vec<_>>());
-    let json = DiffFormat::from_word("json").unwrap();
-    assert_eq!(job.report(&done, json), text(&told.stdout));
+    let json = ReportFormat::from_word("json").unwrap();
+    assert_eq!(job.report(&done.differences, json), text(&told.stdout));
 }
 
 /// What `--topology`, `--source` and `--font` set, set from Rust.

@@ -236,11 +236,11 @@ impl BagFolder {
         if reasons.is_empty() {
             return explain(path, &[], true);
         }
-        Error::UnknownBag {
-            path: path.to_owned(),
-            looks_like: format!("a folder without its recording ({})", reasons.join("; ")),
-            hint: "copy the `.db3` or `.mcap` files that `metadata.yaml` names into it".to_owned(),
-        }
+        Error::unknown_bag(
+            path,
+            &format!("a folder without its recording ({})", reasons.join("; ")),
+            "copy the `.db3` or `.mcap` files that `metadata.yaml` names into it",
+        )
     }
 }
 

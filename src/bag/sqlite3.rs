@@ -133,7 +133,6 @@ fn cut(source: &FileSource) -> Option<String> {
 fn broken(path: &Path, why: &Refusal) -> Error {
     Error::Malformed {
         path: path.to_owned(),
-        offset: 0,
         expected: format!("a database that SQLite can read ({why})"),
         hint: format!(
             "the recording was cut or damaged; `sqlite3 {} .recover` may recover rows",
@@ -150,7 +149,6 @@ fn need(db: &Db, path: &Path, table: &str, names: &[&str]) -> Result<Vec<String>
     }
     Err(Error::Malformed {
         path: path.to_owned(),
-        offset: 0,
         expected: format!("a table `{table}` with the columns {}", names.join(", ")),
         hint: "this database is not a recording, or the recorder was stopped before it began"
             .to_owned(),

@@ -14,11 +14,7 @@ pub(crate) fn explain(path: &Path, head: &[u8], folder: bool) -> Error {
     } else {
         guess(head)
     };
-    Error::UnknownBag {
-        path: path.to_owned(),
-        looks_like: looks_like.to_owned(),
-        hint: hint.to_owned(),
-    }
+    Error::unknown_bag(path, looks_like, hint)
 }
 
 fn guess(head: &[u8]) -> (&'static str, &'static str) {

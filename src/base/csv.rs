@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use csv::{ReaderBuilder, Terminator, WriterBuilder};
 
 use super::cast::to_f32;
-use super::table::{Batch, ColumnKind, ColumnValues, TableColumn, span};
+use super::table::{Batch, ColumnKind, ColumnValues, TableColumn, TableWriter, span};
 use super::words::visible;
 
 /// Writes a table: the column names, then one row per line. Lists are written as JSON with `NaN` and `Infinity`, which
@@ -29,9 +29,10 @@ impl<W: Write> CsvRows<W> {
             field: Vec::new(),
         })
     }
+}
 
-    /// Writes all rows of `batch`.
-    pub(crate) fn write(&mut self, batch: &Batch) -> io::Result<()> {
+impl<W: Write> TableWriter<W> for CsvRows<W> {
+    fn write(&mut self, batch: &Batch) -> io::Result<()> {
         for row in 0..batch.rows {
             for column in &batch.columns {
                 self.field.clear();
@@ -45,8 +46,7 @@ impl<W: Write> CsvRows<W> {
         Ok(())
     }
 
-    /// Ends the table.
-    pub(crate) fn finish(self) -> io::Result<W> {
+    fn finish(self: Box<Self>) -> io::Result<W> {
         self.writer
             .into_inner()
             .map_err(csv::IntoInnerError::into_error)
@@ -249,7 +249,7 @@ mod tests {
         ]);
         let mut rows = CsvRows::new(Vec::new(), &batch).unwrap();
         rows.write(&batch).unwrap();
-        let text = String::from_utf8(rows.finish().unwrap()).unwrap();
+        let text = String::from_utf8(Box::new(rows).finish().unwrap()).unwrap();
         assert_eq!(text, "a,b,c\n\"x,y\",\"say \"\"hi\"\"\",\n,,1e300\n");
     }
 }

@@ -18,73 +18,47 @@ pub enum Error {
         /// The system's error.
         source: io::Error,
     },
-    /// `path` is not a bag of a known format.
-    UnknownBag {
-        /// The file or folder.
-        path: PathBuf,
-        /// What the file is instead, if known: `empty`, `a git-LFS pointer`, …
-        looks_like: String,
-        /// Advice for the user.
-        hint: String,
-    },
-    /// A bag breaks its format in a way that leaves nothing to read.
+    /// A file or folder that is not a bag of a known format.
+    UnknownBag(Fault),
+    /// A bag that breaks its format in a way that leaves nothing to read.
     Malformed {
         /// The bag.
         path: PathBuf,
-        /// The place of the damage, in bytes from the file's start.
-        offset: u64,
         /// The expected content.
         expected: String,
         /// Advice for the user.
         hint: String,
     },
     /// A bag of a known kind that cannot be read.
-    Unsupported {
-        /// The bag.
-        path: PathBuf,
-        /// The reason why it cannot be read.
-        what: String,
-        /// Advice for the user.
-        hint: String,
-    },
-    /// A bag, or the requested part of it, contains no message.
-    NoMessages {
-        /// The bag.
-        path: PathBuf,
-        /// Advice for the user.
-        hint: String,
-    },
+    Unsupported(Fault),
+    /// A bag, or the requested part of it, that contains no message.
+    NoMessages(Fault),
     /// A file of the user's (style, topology, expectation) with a mistake in it.
-    BadFile {
-        /// The file.
-        path: PathBuf,
-        /// The line, ≥ 1; 0 if unknown.
-        line: usize,
-        /// The character in the line, ≥ 1; 0 if unknown.
-        column: usize,
-        /// The mistake.
-        reason: String,
-        /// Advice for the user.
-        hint: String,
-    },
+    BadFile(Fault),
     /// An invalid request. Exit code 2.
-    Usage {
-        /// The mistake, with the value.
-        what: String,
-        /// Advice for the user.
-        hint: String,
-    },
+    Usage(Fault),
     /// The user interrupted the command.
     Interrupted,
     /// Something could not be drawn or written.
-    Output {
-        /// The file that was to be written.
-        path: PathBuf,
-        /// The reason for the failure.
-        reason: String,
-        /// Advice for the user.
-        hint: String,
-    },
+    Output(Fault),
+}
+
+/// What is wrong, and what to do about it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// One sentence without a period, with the file or the value.
+    pub what: String,
+    /// Advice for the user; empty for none.
+    pub hint: String,
+}
+
+impl Fault {
+    fn new(what: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self {
+            what: what.into(),
+            hint: hint.into(),
+        }
+    }
 }
 
 /// The result of every fallible function of this crate.
@@ -103,10 +77,13 @@ impl Error {
 
     /// An [`Error::Usage`] for an invalid value.
     pub fn usage(what: impl Into<String>, hint: impl Into<String>) -> Self {
-        Self::Usage {
-            what: what.into(),
-            hint: hint.into(),
-        }
+        Self::Usage(Fault::new(what, hint))
+    }
+
+    /// The error for a file or folder that is something else than a bag: `empty`, `a git-LFS pointer`, …
+    pub(crate) fn unknown_bag(path: &Path, looks_like: &str, hint: impl Into<String>) -> Self {
+        let what = format!("`{}` is not a bag: it is {looks_like}", path.display());
+        Self::UnknownBag(Fault::new(what, hint))
     }
 
     /// The error for a mistake in a line of a file of the user's; 0 if the line is unknown.
@@ -116,35 +93,58 @@ impl Error {
         reason: impl Into<String>,
         hint: impl Into<String>,
     ) -> Self {
-        Self::BadFile {
-            path: path.to_owned(),
-            line,
-            column: 0,
-            reason: reason.into(),
-            hint: hint.into(),
-        }
+        Self::bad_place(path, [line, 0], &reason.into(), hint)
+    }
+
+    /// As [`Error::bad_file`], at a line and a character in it, both 0 if unknown.
+    pub(crate) fn bad_place(
+        path: &Path,
+        at: [usize; 2],
+        reason: &str,
+        hint: impl Into<String>,
+    ) -> Self {
+        let place = match at {
+            [0, _] => String::new(),
+            [line, 0] => format!(" line {line}"),
+            [line, column] => format!(" line {line}, column {column}"),
+        };
+        let what = format!("`{}`{place}: {reason}", path.display());
+        Self::BadFile(Fault::new(what, hint))
     }
 
     /// The error for a bag that cannot be read.
     pub(crate) fn unsupported(
         path: impl Into<PathBuf>,
-        what: impl Into<String>,
+        what: impl fmt::Display,
         hint: impl Into<String>,
     ) -> Self {
-        Self::Unsupported {
-            path: path.into(),
-            what: what.into(),
-            hint: hint.into(),
-        }
+        let what = format!("`{}` cannot be read: {what}", path.into().display());
+        Self::Unsupported(Fault::new(what, hint))
+    }
+
+    /// The error for a bag without messages.
+    pub(crate) fn no_messages(name: &str, hint: impl Into<String>) -> Self {
+        let what = format!("`{name}` contains no messages");
+        Self::NoMessages(Fault::new(what, hint))
     }
 
     /// The error for something that could not be drawn or written.
     #[cfg(feature = "render")]
-    pub(crate) fn output(path: &Path, reason: impl Into<String>, hint: impl Into<String>) -> Self {
-        Self::Output {
-            path: path.to_owned(),
-            reason: reason.into(),
-            hint: hint.into(),
+    pub(crate) fn output(path: &Path, reason: impl fmt::Display, hint: impl Into<String>) -> Self {
+        let what = format!("cannot write `{}`: {reason}", path.display());
+        Self::Output(Fault::new(what, hint))
+    }
+
+    /// What is wrong, if it is not an error of the system.
+    fn fault(&self) -> Option<&Fault> {
+        match self {
+            Self::UnknownBag(fault)
+            | Self::Unsupported(fault)
+            | Self::NoMessages(fault)
+            | Self::BadFile(fault)
+            | Self::Usage(fault)
+            | Self::Output(fault) => Some(fault),
+            Self::Io { .. } | Self::Malformed { .. } | Self::Interrupted => None,
         }
     }
 
@@ -152,20 +152,16 @@ impl Error {
     pub fn hint(&self) -> String {
         match self {
             Self::Io { source, .. } => io_hint(source).to_owned(),
-            Self::Interrupted => String::new(),
-            Self::UnknownBag { hint, .. }
-            | Self::Malformed { hint, .. }
-            | Self::Unsupported { hint, .. }
-            | Self::NoMessages { hint, .. }
-            | Self::BadFile { hint, .. }
-            | Self::Usage { hint, .. }
-            | Self::Output { hint, .. } => hint.clone(),
+            Self::Malformed { hint, .. } => hint.clone(),
+            other => other
+                .fault()
+                .map_or_else(String::new, |fault| fault.hint.clone()),
         }
     }
 
     /// Whether the command line was at fault (exit code 2) rather than the data (1).
     pub fn is_usage(&self) -> bool {
-        matches!(self, Self::Usage { .. })
+        matches!(self, Self::Usage(_))
     }
 }
 
@@ -186,43 +182,13 @@ impl fmt::Display for Error {
                 doing,
                 source,
             } => write!(f, "cannot {doing} `{}`: {source}", path.display()),
-            Self::UnknownBag {
-                path, looks_like, ..
-            } => write!(f, "`{}` is not a bag: it is {looks_like}", path.display()),
-            Self::Malformed {
-                path,
-                offset,
-                expected,
-                ..
-            } => write!(
+            Self::Malformed { path, expected, .. } => write!(
                 f,
-                "`{}` is malformed at byte {offset}: expected {expected}",
+                "`{}` is malformed at byte 0: expected {expected}",
                 path.display()
             ),
-            Self::Unsupported { path, what, .. } => {
-                write!(f, "`{}` cannot be read: {what}", path.display())
-            }
-            Self::NoMessages { path, .. } => write!(f, "`{}` contains no messages", path.display()),
-            Self::BadFile {
-                path,
-                line,
-                column,
-                reason,
-                ..
-            } => {
-                write!(f, "`{}`", path.display())?;
-                match (line, column) {
-                    (0, _) => {}
-                    (_, 0) => write!(f, " line {line}")?,
-                    _ => write!(f, " line {line}, column {column}")?,
-                }
-                write!(f, ": {reason}")
-            }
-            Self::Usage { what, .. } => f.write_str(what),
             Self::Interrupted => f.write_str("interrupted; unfinished outputs were removed"),
-            Self::Output { path, reason, .. } => {
-                write!(f, "cannot write `{}`: {reason}", path.display())
-            }
+            other => f.write_str(other.fault().map_or("", |fault| &fault.what)),
         }
     }
 }

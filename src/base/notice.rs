@@ -72,6 +72,14 @@ impl Notice {
             text: text.into(),
         }
     }
+
+    /// How often it happened, to follow the text: ` (3 times)`; empty for once.
+    pub(crate) fn times(&self) -> String {
+        match self.count {
+            0 | 1 => String::new(),
+            n => format!(" ({n} times)"),
+        }
+    }
 }
 
 /// Notices sorted by kind and text, equal ones counted. Bounded, so a hostile bag cannot exhaust memory.

@@ -339,6 +339,25 @@ impl Batch {
     }
 }
 
+/// A table in progress.
+pub(crate) trait TableWriter<W> {
+    /// Writes all rows of `batch`, which must have the table's columns.
+    fn write(&mut self, batch: &Batch) -> std::io::Result<()>;
+
+    /// The number of bytes of encoded rows in memory.
+    fn held(&self) -> usize {
+        0
+    }
+
+    /// Writes the rows in memory.
+    fn unload(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+
+    /// Ends the table and returns the sink that it was written to.
+    fn finish(self: Box<Self>) -> std::io::Result<W>;
+}
+
 /// The range of the elements of list `at` in the level below.
 pub(crate) fn span(ends: &[i32], at: usize) -> std::ops::Range<usize> {
     let start = at.checked_sub(1).map_or(0, |before| place(ends[before]));

@@ -209,34 +209,14 @@ fn to_nanos(secs: f64) -> Option<i64> {
 
 /// The smallest round length of time that is at least `least` nanoseconds: 1 ms, 2 ms, … 6 h, and whole days.
 pub(crate) fn round_length(least: i64) -> i64 {
+    /// In milliseconds, up to six hours.
     const STEPS: [i64; 24] = [
-        SECOND / 1000,
-        SECOND / 500,
-        SECOND / 200,
-        SECOND / 100,
-        SECOND / 50,
-        SECOND / 20,
-        SECOND / 10,
-        SECOND / 5,
-        SECOND / 2,
-        SECOND,
-        2 * SECOND,
-        5 * SECOND,
-        10 * SECOND,
-        20 * SECOND,
-        30 * SECOND,
-        60 * SECOND,
-        120 * SECOND,
-        300 * SECOND,
-        600 * SECOND,
-        1200 * SECOND,
-        1800 * SECOND,
-        3600 * SECOND,
-        7200 * SECOND,
-        21_600 * SECOND,
+        1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 30_000, 60_000,
+        120_000, 300_000, 600_000, 1_200_000, 1_800_000, 3_600_000, 7_200_000, 21_600_000,
     ];
     const DAY: i64 = 86_400 * SECOND;
-    let found = STEPS.iter().copied().find(|step| *step >= least);
+    let mut steps = STEPS.iter().map(|millis| millis * (SECOND / 1000));
+    let found = steps.find(|step| *step >= least);
     found.unwrap_or_else(|| ((least - 1) / DAY + 1).saturating_mul(DAY))
 }
 

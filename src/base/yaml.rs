@@ -150,62 +150,29 @@ impl From<Location> for YamlPlace {
     }
 }
 
-/// The parser's messages and what a user can do about them. Messages about Rust or parser options are never shown.
-const MISTAKES: [(&str, &str); 13] = [
-    (
-        "budget",
-        "it contains too many values, or they are nested too deeply",
-    ),
-    (
-        "tabs disallowed",
-        "a tab indents the line; YAML only allows spaces",
-    ),
-    (
-        "found a tab",
-        "a tab indents a line after it; YAML only allows spaces",
-    ),
-    (
-        "did not find expected key",
-        "the indentation of the line differs from that of its siblings",
-    ),
-    (
-        "expected '-' indicator",
-        "the list ends here; begin the line with `- `, or indent it as its key",
-    ),
-    (
-        "multiple YAML documents",
-        "a second document begins; remove the line `---`",
-    ),
-    (
-        "unknown anchor",
-        "`*` refers to an undefined anchor; put text that begins with `*` in quotes",
-    ),
-    (
-        "mapping values are not allowed",
-        "more than one key in the line, or wrong indentation; put text that contains `: ` in quotes",
-    ),
-    (
-        "simple key expected ':'",
-        "the line is neither a key with `:` nor part of a list",
-    ),
-    (
-        "unknown escape character",
-        "`\\` begins no known escape; put the text in single quotes",
-    ),
-    ("misplaced bracket", "a closing bracket has no opening one"),
-    (
-        "multiline quoted scalar",
-        "a quote is not closed, or the line after it is not indented",
-    ),
-    ("recursion", "values are nested too deeply"),
-];
+/// A line for each of the parser's messages: a part of it, and what a user can do about it. Messages about Rust or parser
+/// options are never shown.
+const MISTAKES: &str = r"budget: it contains too many values, or they are nested too deeply
+tabs disallowed: a tab indents the line; YAML only allows spaces
+found a tab: a tab indents a line after it; YAML only allows spaces
+did not find expected key: the indentation of the line differs from that of its siblings
+expected '-' indicator: the list ends here; begin the line with `- `, or indent it as its key
+multiple YAML documents: a second document begins; remove the line `---`
+unknown anchor: `*` refers to an undefined anchor; put text that begins with `*` in quotes
+mapping values are not allowed: more than one key in the line, or wrong indentation; put text that contains `: ` in quotes
+simple key expected ':': the line is neither a key with `:` nor part of a list
+unknown escape character: `\` begins no known escape; put the text in single quotes
+misplaced bracket: a closing bracket has no opening one
+multiline quoted scalar: a quote is not closed, or the line after it is not indented
+recursion: values are nested too deeply";
 
 /// The mistake as advice that a user can act on.
 fn reason(error: &serde_saphyr::Error) -> String {
     let text = error.to_string();
     let first = text.lines().next().unwrap_or_default();
-    if let Some((_, words)) = MISTAKES.iter().find(|(pattern, _)| first.contains(pattern)) {
-        return (*words).to_owned();
+    let mut mistakes = MISTAKES.lines().filter_map(|line| line.split_once(": "));
+    if let Some((_, words)) = mistakes.find(|(pattern, _)| first.contains(pattern)) {
+        return words.to_owned();
     }
     // The position is shown already: `error: line 2 column 2: …`.
     let plain = match first

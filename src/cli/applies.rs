@@ -6,10 +6,8 @@ use clap::ArgMatches;
 use clap::parser::ValueSource;
 
 use super::args::Inference;
-use super::args::render::RenderArgs;
 use crate::base::error::{Error, Result};
 use crate::export::{OneDrawing, Output};
-use crate::graph::window::Length;
 use crate::pipeline::{Reading, mission_file};
 
 /// The names of the given options, without defaults: `style`, `layout-from`.
@@ -42,54 +40,36 @@ impl Given {
     }
 }
 
-/// Options that only apply to some outputs: to those whose format takes them.
-struct AppliesTo {
-    options: &'static str,
-    /// The outputs to which they apply, for the hint.
-    what: &'static str,
-}
-
-const RULES: &[AppliesTo] = &[
-    AppliesTo {
-        options: "style for size fit orientation layout layout-from font",
-        what: "it applies to pictures, such as `x.gif`",
-    },
-    AppliesTo {
-        options: "width",
-        what: "it is a width on paper, for `x.pdf`, `x.svg` and `x.png`; `--size` sets that of other pictures",
-    },
-    AppliesTo {
-        options: "title",
-        what: "it applies to pictures and reports",
-    },
-    AppliesTo {
-        options: "bare",
-        what: "it applies to animations, pages and single windows: `x.gif`, `x.pdf`, `x{n}.svg`",
-    },
-    AppliesTo {
-        options: "phases",
-        what: "it applies to pictures, pages, reports and data: `x.gif`, `x.html`, `x.json`",
-    },
-    AppliesTo {
-        options: "group collapse",
-        what: "data contains every element by itself; it applies to pictures and graphs, such as `x.gif`, `x.dot`",
-    },
-    AppliesTo {
-        options: "frame-ms",
-        what: "it applies to animations: `x.gif`, `x.svg`",
-    },
-    AppliesTo {
-        options: "strip",
-        what: "it applies to pictures of the whole mission: `x.svg`, `x.png`, `x.webp`, `x.pdf`",
-    },
-    AppliesTo {
-        options: "max-bytes",
-        what: "it applies to `x.gif`",
-    },
-    AppliesTo {
-        options: "link",
-        what: "it applies to reports: `x.md`",
-    },
+/// Options that only apply to outputs whose format takes them, and to which those are, for the hint.
+const RULES: [(&str, &str); 10] = [
+    (
+        "style for size fit orientation layout layout-from font",
+        "it applies to pictures, such as `x.gif`",
+    ),
+    (
+        "width",
+        "it is a width on paper, for `x.pdf`, `x.svg` and `x.png`; `--size` sets that of other pictures",
+    ),
+    ("title", "it applies to pictures and reports"),
+    (
+        "bare",
+        "it applies to animations, pages and single windows: `x.gif`, `x.pdf`, `x{n}.svg`",
+    ),
+    (
+        "phases",
+        "it applies to pictures, pages, reports and data: `x.gif`, `x.html`, `x.json`",
+    ),
+    (
+        "group collapse",
+        "data contains every element by itself; it applies to pictures and graphs, such as `x.gif`, `x.dot`",
+    ),
+    ("frame-ms", "it applies to animations: `x.gif`, `x.svg`"),
+    (
+        "strip",
+        "it applies to pictures of the whole mission: `x.svg`, `x.png`, `x.webp`, `x.pdf`",
+    ),
+    ("max-bytes", "it applies to `x.gif`"),
+    ("link", "it applies to reports: `x.md`"),
 ];
 
 /// Options that ask for windows one after the other.
@@ -112,8 +92,7 @@ pub(super) fn allows_still(given: &Given, outputs: &[Output]) -> bool {
 }
 
 /// Refuses options that apply to none of the outputs.
-pub(super) fn check_outputs(given: &Given, args: &RenderArgs, outputs: &[Output]) -> Result<()> {
-    let is_one_window = args.time.period == Some(Length::All);
+pub(super) fn check_outputs(given: &Given, is_one_window: bool, outputs: &[Output]) -> Result<()> {
     let applies = |option: &str| {
         let takes = |o: &Output| {
             let is_alone = o.target.is_numbered() || is_one_window;
@@ -124,9 +103,9 @@ pub(super) fn check_outputs(given: &Given, args: &RenderArgs, outputs: &[Output]
     let names = outputs.iter();
     let names = names.map(|o| format!("`{}`", o.target.path().display()));
     let what = format!("has no effect on {}", names.collect::<Vec<_>>().join(", "));
-    for rule in RULES {
-        for option in rule.options.split(' ').filter(|option| !applies(option)) {
-            given.refuse(option, &what, rule.what)?;
+    for (options, hint) in RULES {
+        for option in options.split(' ').filter(|option| !applies(option)) {
+            given.refuse(option, &what, hint)?;
         }
     }
     Ok(())
@@ -149,20 +128,6 @@ pub(super) fn check_topics(given: &Given, outputs: &[Output]) -> Result<()> {
         "has no effect on a timeline of topics",
         "omit it, or use `--mode all`",
     )
-}
-
-/// Refuses outputs that cannot contain a figure.
-pub(super) fn check_figure(outputs: &[Output]) -> Result<()> {
-    match outputs.iter().find(|output| !is_whole(output)) {
-        None => Ok(()),
-        Some(output) => Err(Error::usage(
-            format!(
-                "`{}` cannot contain a figure",
-                output.target.path().display()
-            ),
-            "figures are `.pdf`, `.svg`, `.png` or `.webp`, and `.tex` to include them; `bagreel render` writes the rest",
-        )),
-    }
 }
 
 /// Options for how bags are read and windows cut: a mission's JSON contains windows already.

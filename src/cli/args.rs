@@ -1,202 +1,19 @@
-//! The command line: every command and flag with its help text.
-
-pub(super) mod figure;
-pub(super) mod follow;
-pub(super) mod gate;
-mod help;
-pub(super) mod render;
-pub(super) mod tables;
-mod values;
+//! The arguments that several commands share, and what they say.
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::Args;
 
-use crate::base::error::Error;
+use super::values::{length, moment, namespace, offset, one_of, period, phases, share};
+use crate::bag::Input;
+use crate::base::error::{Error, Result};
 use crate::base::time::{Moment, Period};
 use crate::base::words::worded;
-use crate::export::tables::TableFormat;
+use crate::evidence::code::SourceCode;
+use crate::evidence::{conclude, given};
 use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::{Align, Cut, Division, Length};
-use crate::mission::event_log::LogFormat;
-use values::{length, moment, namespace, offset, one_of, period, share};
-
-/// The version, and in packages the commit that they were built from: `0.1.0 (1a2b3c4d5e 2026-11-23)`.
-const VERSION: &str = match option_env!("BAGREEL_VERSION") {
-    Some(named) => named,
-    None => env!("CARGO_PKG_VERSION"),
-};
-
-/// See how a robot's software reconfigures during a mission, straight from its bag files.
-#[derive(Debug, Parser)]
-#[command(name = "bagreel", version = VERSION, max_term_width = 100)]
-#[command(
-    after_help = "Exit codes: 0 done, 1 failed, 2 usage error, 3 done but data was skipped (damaged bag)."
-)]
-pub(super) struct Typed {
-    #[command(subcommand)]
-    pub(super) command: Command,
-    /// Only print errors.
-    #[arg(long, short, global = true, conflicts_with = "verbose")]
-    pub(super) quiet: bool,
-    /// Print every note, not a summary of what was left out or chosen.
-    #[arg(long, short, global = true)]
-    pub(super) verbose: bool,
-    /// When to use colors. `auto`: on a terminal, unless `NO_COLOR` is set.
-    #[arg(long, global = true, value_enum, default_value_t, value_name = "WHEN")]
-    pub(super) color: Colour,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-#[value(rename_all = "lower")]
-pub(super) enum Colour {
-    #[default]
-    Auto,
-    Always,
-    Never,
-}
-
-#[derive(Debug, Subcommand)]
-pub(super) enum Command {
-    /// Draw a mission: animations, frames, pages, figures and data, from one pass over the bag.
-    #[command(after_long_help = render::outputs_help())]
-    Render(Box<render::RenderArgs>),
-    /// Draw a figure for a paper: when each node ran, who publishes to whom, or the reconfigurations one by
-    /// one.
-    Figure(Box<figure::FigureArgs>),
-    /// Summarize a bag: contents, evidence, and what it cannot tell you; for a folder, one row per bag.
-    Info(Box<InfoArgs>),
-    /// Export messages as tables: a row per message, or a table per topic with every field.
-    #[command(after_long_help = EXTRACT_HELP)]
-    Extract(Box<ExtractArgs>),
-    /// Count the messages of many bags per publisher, topic and window: a table per bag.
-    #[command(after_long_help = tables::HELP)]
-    Tables(Box<tables::TablesArgs>),
-    /// Print the event log: what started, stopped, restarted, changed rate or was taken over, and when; for a folder, the logs
-    /// of its bags.
-    Events(Box<EventsArgs>),
-    /// Compare two missions: nodes, topics, connections, rates and events.
-    #[command(after_long_help = gate::DIFF_HELP)]
-    Diff(Box<gate::DiffArgs>),
-    /// Generate an expectations file from healthy runs.
-    #[command(after_long_help = gate::BASELINE_HELP)]
-    Baseline(Box<gate::BaselineArgs>),
-    /// Check a mission against an expectations file: what is missing, new, late or slow.
-    #[command(after_long_help = gate::check_help())]
-    Check(Box<gate::CheckArgs>),
-    /// Follow a recording while it grows: print each event as soon as it is known, without ROS and without locks.
-    #[command(after_long_help = follow::FOLLOW_HELP)]
-    Follow(Box<follow::FollowArgs>),
-    /// List the built-in styles, or print one as a starting point for your own.
-    Styles {
-        /// The style to print as TOML.
-        name: Option<String>,
-    },
-    /// Print completions for a shell.
-    Completions {
-        /// The shell.
-        shell: clap_complete::Shell,
-    },
-    /// Print the manual page, or that of one command.
-    Man {
-        /// The command.
-        command: Option<String>,
-    },
-}
-
-#[derive(Debug, Args)]
-pub(super) struct InfoArgs {
-    #[command(flatten)]
-    pub(super) inputs: Inputs,
-    #[command(flatten)]
-    pub(super) again: VerifyArgs,
-    /// Output format.
-    #[arg(long, value_enum, default_value_t)]
-    pub(super) format: InfoFormat,
-    /// List the evidence for a node or topic (one name) or an edge (two names).
-    #[arg(long, num_args = 1..=2, value_names = ["NAME", "NAME"], conflicts_with_all = ["format", "verify"])]
-    pub(super) why: Vec<String>,
-    #[command(flatten)]
-    pub(super) graph: GraphArgs,
-}
-
-#[derive(Debug, Args)]
-pub(super) struct EventsArgs {
-    #[command(flatten)]
-    pub(super) inputs: Inputs,
-    /// Output format.
-    #[arg(long, value_name = "WORD", default_value = "text", value_parser = one_of(LogFormat::ALL))]
-    pub(super) format: LogFormat,
-    /// List below each event the topics and connections that it affects.
-    #[arg(long)]
-    pub(super) parts: bool,
-    /// Include housekeeping topics and the recorder.
-    #[arg(long)]
-    pub(super) all: bool,
-    /// Show where each phase of the mission begins.
-    #[arg(long)]
-    pub(super) phases: bool,
-    #[command(flatten)]
-    pub(super) range: RangeArgs,
-    #[command(flatten)]
-    pub(super) rate: RateArgs,
-    #[command(flatten)]
-    pub(super) graph: GraphArgs,
-}
-
-#[derive(Debug, Args)]
-pub(super) struct ExtractArgs {
-    /// Bags, as for `render`; the messages of several bags go into one table.
-    #[arg(required = true, value_name = "BAG")]
-    pub(super) bags: Vec<PathBuf>,
-    /// Output file, `.csv` or `.parquet`, or `-` for standard output; with `--fields`, a folder.
-    #[arg(long, short, value_name = "FILE|FOLDER")]
-    pub(super) output: String,
-    /// Output format, if the name has no known extension. [default with `--fields`: csv]
-    #[arg(long, value_name = "csv|parquet", value_parser = one_of(TableFormat::ALL))]
-    pub(super) format: Option<TableFormat>,
-    /// Decode messages into a table per topic with a column per field.
-    #[arg(long)]
-    pub(super) fields: bool,
-    /// Folder of `.msg`, `.srv`, `.action` and `.idl` files for types that the bag does not define (repeatable; common types are built in).
-    #[arg(
-        long,
-        visible_alias = "source",
-        value_name = "DIR",
-        requires = "fields"
-    )]
-    pub(super) msg_path: Vec<PathBuf>,
-    /// Topics to export, as `rqt_graph` filters: `/nav/.*,-/nav/debug`.
-    #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
-    pub(super) topic_filter: Option<String>,
-    #[command(flatten)]
-    pub(super) range: RangeArgs,
-}
-
-const EXTRACT_HELP: &str = "Columns without `--fields`: time_ns, topic, type, publisher, size_bytes; rows are sorted by time.";
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-#[value(rename_all = "lower")]
-pub(super) enum InfoFormat {
-    #[default]
-    Text,
-    Json,
-    Csv,
-    Parquet,
-}
-
-impl InfoFormat {
-    /// The table format; CSV if the format is not one.
-    ///
-    /// # Errors
-    /// If this build does not write it.
-    pub(super) fn of_table(self) -> Result<TableFormat, Error> {
-        match self {
-            Self::Parquet => TableFormat::Parquet.built(),
-            _ => Ok(TableFormat::Csv),
-        }
-    }
-}
+use crate::pipeline::{Phases, Reading};
 
 #[derive(Debug, Default, Args)]
 pub(super) struct Inputs {
@@ -314,5 +131,45 @@ worded! {
         Payloads = "payloads",
         /// Unnamed nodes, from source code.
         Source = "source",
+    }
+}
+
+#[derive(Debug, Args)]
+pub(super) struct PhaseArgs {
+    /// Phases of the mission: detected (`auto`), `none`, or a file of lines such as `0:38 navigation` or names alone.
+    #[arg(long, value_name = "FILE|auto|none", default_value = "auto", value_parser = phases)]
+    pub(super) phases: Phases,
+}
+
+/// The reading of a mission, with the defaults of all other options.
+pub(super) fn reading(inputs: &Inputs, graph: &GraphArgs) -> Result<Reading> {
+    let mut reading = Reading {
+        inputs: inputs.bags.iter().map(Input::parse).collect(),
+        offsets: inputs.offset.clone(),
+        namespaces: inputs.ns.clone(),
+        conclude: conclude::ConcludeOptions {
+            topology: given::read_all(&graph.topology)?,
+            code: None,
+        },
+        code: source_code(graph)?,
+        ..Reading::default()
+    };
+    reading.collect.infer_stamps = graph.infer.contains(&Inference::Stamps);
+    if graph.infer.contains(&Inference::Payloads) {
+        reading.collect.payload_bytes = u64::MAX;
+    }
+    Ok(reading)
+}
+
+/// The source code to read, if any.
+fn source_code(graph: &GraphArgs) -> Result<Option<SourceCode>> {
+    let infers = graph.infer.contains(&Inference::Source);
+    match graph.source.clone() {
+        Some(folder) => Ok(Some(SourceCode { folder, infers })),
+        None if infers => Err(Error::usage(
+            "`--infer source` requires source code",
+            "add `--source DIR` for a workspace or repository",
+        )),
+        None => Ok(None),
     }
 }

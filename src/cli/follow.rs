@@ -1,9 +1,14 @@
 //! `follow`: polls a recording, prints what is new, and writes the outputs at the end.
 
-use super::args::follow::FollowArgs;
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use clap::Args;
+
 use super::render;
 use super::show::NO_EVENTS;
 use super::terminal::Terminal;
+use super::values::{length, one_of, period};
 use super::{DONE, code, gate};
 use crate::bag::Growth;
 use crate::base::error::Result;
@@ -14,6 +19,33 @@ use crate::graph::window::Length;
 use crate::mission::event_log::LogFormat;
 use crate::pipeline::follow::{Feed, FindingFeed, Follow};
 use crate::pipeline::{Reading, Render};
+
+#[derive(Debug, Args)]
+pub(super) struct FollowArgs {
+    /// The recording: `.bag.active`, `.bag`, `.mcap`, `.db3`, a rosbag2 folder, or a folder whose newest recording
+    /// is followed.
+    #[arg(value_name = "WHAT")]
+    what: PathBuf,
+    /// Output format: a line per event for people, or an object per line for programs.
+    #[arg(long, value_name = "text|ndjson", default_value = "text", value_parser = one_of([LogFormat::Text, LogFormat::Ndjson]))]
+    format: LogFormat,
+    /// Check the recording against this expectations file: print findings when they are certain, and exit
+    /// as `check` does.
+    #[arg(long, value_name = "FILE")]
+    expect: Option<PathBuf>,
+    /// Output file, written at the end as `render` writes it from the closed recording. Repeatable.
+    #[arg(long = "output", short, value_name = "FILE")]
+    outputs: Vec<OsString>,
+    /// Length of a window in outputs, and for rules about rates.
+    #[arg(long, short, value_parser = length)]
+    period: Option<Length>,
+    /// Stop when nothing was written for this long. [default: when the recorder closes the recording, or at a signal]
+    #[arg(long, value_name = "TIME", value_parser = period)]
+    idle: Option<Period>,
+}
+
+pub(super) const HELP: &str = "Nothing is written to the recording, and a database is never locked. A line is marked `(so far)` until it is certain.\n\n\
+    Exit codes: 0 done, 1 failed or a rule is broken, 2 usage error, 3 done but data was skipped (damaged bag).";
 
 /// The number of newest messages in which events are detected: less than a tenth of a second of work, and
 /// several minutes for most robots.

@@ -1,23 +1,147 @@
-//! `diff`, `baseline` and `check`: from arguments to pipeline jobs, and from their outcome to an exit code.
+//! `diff`, `baseline` and `check`: their arguments, the jobs that they are, and exit codes of their outcome.
 
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
+use clap::{Args, ValueEnum};
+
 use super::applies::{self, Given};
-use super::args::gate::{BaselineArgs, CheckArgs, DiffArgs, Undecidable};
-use super::args::{GraphArgs, Inputs, RangeArgs};
-use super::look::summary;
-use super::reading::reading;
+use super::args::{GraphArgs, Inputs, RangeArgs, reading};
+use super::render::summary;
 use super::terminal::Terminal;
+use super::values::{length, share};
 use super::{DONE, FAILED, SKIPPED, USAGE, code};
 use crate::base::error::{Error, Result};
 use crate::base::notice::Notices;
 use crate::base::words;
 use crate::export::target::Target;
-use crate::gate::{CheckFormat, FORMATS, Judgement, Severity, explain};
+use crate::gate::{FORMATS, Judgement, ReportFormat, Severity, explain};
+use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::Length;
 use crate::mission::Mission;
 use crate::pipeline::{self, Baseline, Check, Diff, Reading, Report};
+
+#[derive(Debug, Args)]
+pub(super) struct DiffArgs {
+    /// First mission: a bag, a folder, a mission's JSON, or an expectations file (`.yaml`).
+    #[arg(value_name = "A")]
+    first: PathBuf,
+    /// Second mission, in the same forms.
+    #[arg(value_name = "B")]
+    second: PathBuf,
+    /// Output format.
+    #[arg(long, value_name = "text|json|markdown", default_value = "text", value_parser = diff_format)]
+    format: &'static ReportFormat,
+    /// Also write this file: `.txt`, `.json`, `.md`, or a picture of both in any format of `render`. Repeatable.
+    #[arg(long = "output", short, value_name = "FILE")]
+    outputs: Vec<OsString>,
+    /// Report rates that differ by more than this fraction, if statistically significant.
+    #[arg(long, value_name = "SHARE", default_value_t = RATE_CHANGE, value_parser = share)]
+    rate_change: f64,
+    #[command(flatten)]
+    range: RangeArgs,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct BaselineArgs {
+    /// Bags of healthy runs, one run each.
+    #[arg(required = true, value_name = "BAG")]
+    bags: Vec<PathBuf>,
+    /// Output file; `-` is standard output.
+    #[arg(
+        long,
+        short,
+        value_name = "FILE",
+        default_value = "-",
+        conflicts_with = "update"
+    )]
+    output: OsString,
+    /// Update this expectations file: rewrite only what no longer matches and keep comments.
+    #[arg(long, value_name = "FILE")]
+    update: Option<PathBuf>,
+    /// Update only these nodes and topics.
+    #[arg(long, value_name = "NAME", requires = "update")]
+    only: Vec<String>,
+    /// Length of the windows in which rates are measured: `60`, `30s`, `500ms`. [default: the file's `period`]
+    #[arg(long, short, value_parser = length)]
+    period: Option<Length>,
+    #[command(flatten)]
+    range: RangeArgs,
+    /// Add nodes and edges from a CSV, YAML, MCAP (`/rosgraph`) or launch file, or from DOT saved by rqt_graph.
+    #[arg(long, value_name = "FILE")]
+    topology: Vec<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct CheckArgs {
+    /// Bags, as for `render`; several are read as one mission.
+    #[arg(required_unless_present = "explain", value_name = "BAG")]
+    bags: Vec<PathBuf>,
+    /// Expectations file to check against.
+    #[arg(long, value_name = "FILE", required_unless_present = "explain")]
+    expect: Option<PathBuf>,
+    /// Output format.
+    #[arg(long, value_name = "WORD", default_value = "text", value_parser = check_format)]
+    format: &'static ReportFormat,
+    /// Also write this file, in the format of its extension or prefix: `check.xml`, `gitlab:quality.json`. Repeatable.
+    #[arg(long = "output", short, value_name = "[WORD:]FILE")]
+    outputs: Vec<OsString>,
+    /// How to treat rules that cannot be evaluated.
+    #[arg(long, value_enum, default_value_t)]
+    undecidable: Undecidable,
+    /// Explain a kind of finding, such as `topic-rate-low`, and exit.
+    #[arg(long, value_name = "ID", conflicts_with_all = [
+        "bags", "expect", "format", "outputs", "undecidable", "start", "end", "topology", "source", "infer",
+    ])]
+    explain: Option<String>,
+    #[command(flatten)]
+    range: RangeArgs,
+    #[command(flatten)]
+    graph: GraphArgs,
+}
+
+/// The effect of undecidable rules on the exit code.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "lower")]
+pub(super) enum Undecidable {
+    /// They do not fail the check.
+    #[default]
+    Allow,
+    /// They fail the check.
+    Error,
+}
+
+pub(super) const DIFF_HELP: &str = "Exit codes: 0 equal, 1 different, 2 not compared (usage error, unreadable bag), 3 equal but data was skipped \
+    (damaged bag).";
+pub(super) const BASELINE_HELP: &str =
+    "Exit codes: 0 written, 1 failed, 2 usage error, 3 written but data was skipped (damaged bag).";
+pub(super) const CHECK_HELP: &str = "Exit codes: 0 passed, 1 failed, 2 not checked (usage error, unreadable bag, no rule could be evaluated), 3 passed but \
+    data was skipped (damaged bag).";
+
+fn check_format(word: &str) -> Result<&'static ReportFormat, String> {
+    ReportFormat::from_word(word).ok_or_else(|| {
+        let words: Vec<&str> = FORMATS.iter().map(|f| f.word).collect();
+        format!("write one of {}", words.join(", "))
+    })
+}
+
+fn diff_format(word: &str) -> Result<&'static ReportFormat, String> {
+    let format = ReportFormat::from_word(word).filter(|format| format.differences.is_some());
+    format.ok_or_else(|| "write one of text, json, markdown".to_owned())
+}
+
+/// The formats, for the end of `check --help`.
+pub(super) fn check_help() -> String {
+    let rows = FORMATS.iter().map(|f| {
+        let ends = f
+            .endings
+            .first()
+            .map_or_else(String::new, |e| format!(" ({e})"));
+        format!("  {:<9} {}{ends}", f.word, f.what)
+    });
+    let rows: Vec<String> = rows.collect();
+    format!("Formats:\n{}\n\n{CHECK_HELP}", rows.join("\n"))
+}
 
 /// Prints the differences between two missions, or between one and an expectation.
 pub(super) fn diff(args: &DiffArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
@@ -42,12 +166,16 @@ pub(super) fn diff(args: &DiffArgs, given: &Given, terminal: &mut Terminal) -> R
         applies::check_inputs(given, reading)?;
     }
     let done = pipeline::diff(&job, terminal)?;
-    print(&job.report(&done, args.format), args.format.word, terminal)?;
+    print(
+        &job.report(&done.differences, args.format),
+        args.format.word,
+        terminal,
+    )?;
     for remark in &done.remarks {
         terminal.note(remark);
     }
     terminal.notices(&notices(&done.missions));
-    let reports = job.reports.iter().map(|(target, _)| target);
+    let reports = job.reports.iter().map(|report| &report.target);
     let targets = reports.chain(job.pictures.iter().map(|picture| &picture.target));
     let what = words::count(done.differences.len(), "difference");
     wrote(targets, &what, terminal);
@@ -94,11 +222,10 @@ fn against(
     (bag, expect): (&Path, &Path),
     terminal: &mut Terminal,
 ) -> Result<u8> {
-    let format = CheckFormat::from_word(args.format.word);
     let check = CheckArgs {
         bags: vec![bag.to_owned()],
         expect: Some(expect.to_owned()),
-        format: format.unwrap_or(&FORMATS[0]),
+        format: args.format,
         outputs: args.outputs.clone(),
         undecidable: Undecidable::Allow,
         explain: None,
@@ -185,7 +312,7 @@ pub(super) fn judge_closed(
     reading: Reading,
     what: &Path,
     expect: &Path,
-    format: Option<&CheckFormat>,
+    format: Option<&ReportFormat>,
     terminal: &mut Terminal,
 ) -> Result<u8> {
     let mut job = Check::new(reading, expect);
@@ -195,7 +322,7 @@ pub(super) fn judge_closed(
 }
 
 /// Runs the check, prints the findings if a format is given, and returns the exit code.
-fn verdict(job: &Check, format: Option<&CheckFormat>, terminal: &mut Terminal) -> Result<u8> {
+fn verdict(job: &Check, format: Option<&ReportFormat>, terminal: &mut Terminal) -> Result<u8> {
     let done = pipeline::check(job, terminal)?;
     if let Some(format) = format {
         print(&job.report(&done, format), format.word, terminal)?;
@@ -248,7 +375,7 @@ fn judged(bags: &[PathBuf], range: RangeArgs, graph: &GraphArgs) -> Result<Readi
 /// A report to write; Markdown if it is a CI job's summary file, which has no extension.
 fn report(output: &OsStr) -> Result<Report> {
     let is_summary = summary().is_some_and(|path| path == Path::new(output));
-    match CheckFormat::from_word("markdown").filter(|_| is_summary) {
+    match ReportFormat::from_word("markdown").filter(|_| is_summary) {
         Some(format) => Ok(Report {
             target: Target::parse(output),
             format,

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::base::error::{Error, Result};
 use crate::base::nearest::suggestion;
 use crate::cli::DONE;
-use crate::cli::args::Typed;
+use crate::cli::Typed;
 use crate::cli::terminal::Terminal;
 use crate::draw::style::{BUILTIN, builtin_text};
 

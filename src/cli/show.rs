@@ -2,17 +2,83 @@
 
 use std::path::Path;
 
+use clap::{Args, ValueEnum};
+
 use super::applies::{self, Given};
-use super::args::{EventsArgs, InfoArgs, InfoFormat};
-use super::reading::reading;
+use super::args::{GraphArgs, Inputs, RangeArgs, RateArgs, VerifyArgs, reading};
 use super::terminal::Terminal;
+use super::values::one_of;
 use super::{DONE, SKIPPED, code};
-use crate::base::error::Error;
+use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
+use crate::export::tables::TableFormat;
 use crate::graph::window::Length;
 use crate::mission::event_log::{LogFormat, LogLine, LogOptions, body, lines, log, whole};
 use crate::mission::info::{SurveyRow, json, survey_text};
 use crate::pipeline::{Reading, Survey, each, explain, is_survey, read, survey, survey_file};
+
+#[derive(Debug, Args)]
+pub(super) struct InfoArgs {
+    #[command(flatten)]
+    inputs: Inputs,
+    #[command(flatten)]
+    again: VerifyArgs,
+    /// Output format.
+    #[arg(long, value_enum, default_value_t)]
+    format: InfoFormat,
+    /// List the evidence for a node or topic (one name) or an edge (two names).
+    #[arg(long, num_args = 1..=2, value_names = ["NAME", "NAME"], conflicts_with_all = ["format", "verify"])]
+    why: Vec<String>,
+    #[command(flatten)]
+    graph: GraphArgs,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "lower")]
+pub(super) enum InfoFormat {
+    #[default]
+    Text,
+    Json,
+    Csv,
+    Parquet,
+}
+
+impl InfoFormat {
+    /// The table format; CSV if the format is not one.
+    ///
+    /// # Errors
+    /// If this build does not write it.
+    fn of_table(self) -> Result<TableFormat> {
+        match self {
+            Self::Parquet => TableFormat::Parquet.built(),
+            _ => Ok(TableFormat::Csv),
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+pub(super) struct EventsArgs {
+    #[command(flatten)]
+    inputs: Inputs,
+    /// Output format.
+    #[arg(long, value_name = "WORD", default_value = "text", value_parser = one_of(LogFormat::ALL))]
+    format: LogFormat,
+    /// List below each event the topics and connections that it affects.
+    #[arg(long)]
+    parts: bool,
+    /// Include housekeeping topics and the recorder.
+    #[arg(long)]
+    all: bool,
+    /// Show where each phase of the mission begins.
+    #[arg(long)]
+    phases: bool,
+    #[command(flatten)]
+    range: RangeArgs,
+    #[command(flatten)]
+    rate: RateArgs,
+    #[command(flatten)]
+    graph: GraphArgs,
+}
 
 /// The number of parts of a mission for which `info` shows the activity.
 const PARTS: u32 = 32;
@@ -21,11 +87,7 @@ const PARTS: u32 = 32;
 pub(super) const NO_EVENTS: &str = "no events: nothing started, stopped or changed";
 
 /// Prints the log of a mission, or those of the bags in a folder.
-pub(super) fn events(
-    args: &EventsArgs,
-    given: &Given,
-    terminal: &mut Terminal,
-) -> Result<u8, Error> {
+pub(super) fn events(args: &EventsArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     let mut reading = reading(&args.inputs, &args.graph)?;
     reading.division = args.range.in_windows(None);
     reading.rate_change = args.rate.rate_change;
@@ -73,7 +135,7 @@ fn events_of_folder(
     reading: &Reading,
     form: LogOf,
     terminal: &mut Terminal,
-) -> Result<u8, Error> {
+) -> Result<u8> {
     let LogOf { format, options } = form;
     let (mut rows, mut shown) = (String::new(), Vec::new());
     let mut notices = Notices::new();
@@ -110,7 +172,7 @@ fn events_of_folder(
 }
 
 /// Prints the summary of a mission, or a row for each bag of a folder.
-pub(super) fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> Result<u8, Error> {
+pub(super) fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     let mut reading = reading(&args.inputs, &args.graph)?;
     reading.verify = args.again.verify;
     reading.division.length = Length::Parts(PARTS);

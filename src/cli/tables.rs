@@ -1,16 +1,77 @@
-//! `bagreel extract` and `bagreel tables`: from arguments to tables of messages, and of their counts.
+//! `bagreel extract` and `bagreel tables`: tables of messages, and of their counts.
 
-use super::args::ExtractArgs;
-use super::args::tables::TablesArgs;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::args::RangeArgs;
 use super::terminal::Terminal;
+use super::values::{one_of, period};
 use super::{DONE, SKIPPED};
 use crate::bag::Input;
 use crate::base::error::{Error, Result};
+use crate::base::time::Period;
 use crate::base::words;
 use crate::export::tables::TableFormat;
 use crate::export::target::Target;
 use crate::pipeline::{self, Counting, Extract, Tabled, Tables};
 use crate::view::NameFilter;
+
+#[derive(Debug, Args)]
+pub(super) struct ExtractArgs {
+    /// Bags, as for `render`; the messages of several bags go into one table.
+    #[arg(required = true, value_name = "BAG")]
+    bags: Vec<PathBuf>,
+    /// Output file, `.csv` or `.parquet`, or `-` for standard output; with `--fields`, a folder.
+    #[arg(long, short, value_name = "FILE|FOLDER")]
+    output: String,
+    /// Output format, if the name has no known extension. [default with `--fields`: csv]
+    #[arg(long, value_name = "csv|parquet", value_parser = one_of(TableFormat::ALL))]
+    format: Option<TableFormat>,
+    /// Decode messages into a table per topic with a column per field.
+    #[arg(long)]
+    fields: bool,
+    /// Folder of `.msg`, `.srv`, `.action` and `.idl` files for types that the bag does not define (repeatable; common types are built in).
+    #[arg(
+        long,
+        visible_alias = "source",
+        value_name = "DIR",
+        requires = "fields"
+    )]
+    msg_path: Vec<PathBuf>,
+    /// Topics to export, as `rqt_graph` filters: `/nav/.*,-/nav/debug`.
+    #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
+    topic_filter: Option<String>,
+    #[command(flatten)]
+    range: RangeArgs,
+}
+
+pub(super) const EXTRACT_HELP: &str = "Columns without `--fields`: time_ns, topic, type, publisher, size_bytes; rows are sorted by time.";
+
+#[derive(Debug, Args)]
+pub(super) struct TablesArgs {
+    /// Bags, or folders with bags below them.
+    #[arg(required = true, value_name = "BAG|FOLDER")]
+    bags: Vec<PathBuf>,
+    /// Output folder, for a table per bag: `day1/run.bag.csv` for `bags/day1/run.bag`, if `bags/` is given.
+    #[arg(long, short, value_name = "FOLDER")]
+    output: PathBuf,
+    /// Output format.
+    #[arg(long, value_name = "csv|parquet", default_value = "csv", value_parser = one_of(TableFormat::ALL))]
+    format: TableFormat,
+    /// Length of a window; windows begin at whole periods of UTC.
+    #[arg(long, short, value_parser = period, default_value = "10s")]
+    period: Period,
+    /// Skip bags that are older than their table, whatever options it was made with.
+    #[arg(long)]
+    skip_existing: bool,
+}
+
+pub(super) const HELP: &str = "\
+Columns: bag, format, period_ns, win, start_ns, end_ns, topic, type, node, node_role, n, bytes, first_ns, last_ns,
+         max_gap_ns; a row per publisher, topic and window with messages.
+
+Exit codes: 0 done, 1 failed, 2 usage error, 3 done, but some bags are unreadable or damaged.";
 
 /// Writes the messages; returns the exit code.
 pub(super) fn extract(args: &ExtractArgs, terminal: &mut Terminal) -> Result<u8> {

@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use terminal_size::{Height, Width, terminal_size_of};
 
-use super::args::{Colour, Typed};
 use super::stop::Stop;
+use super::{Colour, Typed};
 use crate::base::columns::{fitted, hang};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
@@ -88,11 +88,8 @@ impl Terminal {
         } else {
             ("36", "note")
         };
-        let times = match notice.count {
-            0 | 1 => String::new(),
-            n => format!(" ({n} times)"),
-        };
-        self.line(colour, label, &format!("{}{times}", notice.text));
+        let text = notice.text.clone() + &notice.times();
+        self.line(colour, label, &text);
     }
 
     /// Prints a line on standard error unless quiet.

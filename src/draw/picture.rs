@@ -40,7 +40,7 @@ use crate::draw::text::Fonts;
 use crate::draw::timeline::Timeline;
 use crate::draw::timeline::below::Below;
 use crate::graph::Id as _;
-use crate::layout::{self, Engine, Layout, Orientation, Plan};
+use crate::layout::{self, Layout, Orientation, Plan};
 use crate::view::{ArrowId, ArrowKind, Frame, ItemId, SeenWindow, View};
 
 /// The user's options of the picture.
@@ -181,12 +181,6 @@ impl<'a> Measured<'a> {
     pub fn with(self, layout: Layout) -> Picture<'a> {
         Picture::new(self, layout)
     }
-
-    /// The picture as `engine` lays it out.
-    pub fn laid_out(self, engine: &dyn Engine) -> Picture<'a> {
-        let layout = layout::lay_out(self.plan(), &self.layout_options(), engine);
-        self.with(layout)
-    }
 }
 
 /// A sequence of scenes. It may be shared among threads.
@@ -265,6 +259,11 @@ impl<'a> Picture<'a> {
     /// Whether there is no frame.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// The plan of its layout.
+    pub fn plan(&self) -> &Plan {
+        self.measured.plan()
     }
 
     /// All positions, in the layout's own pixels.

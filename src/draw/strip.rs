@@ -11,7 +11,7 @@ use crate::draw::scene::{Anchor, Form, Group, Piece, Scene, Shape, Stroke, Text}
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::draw::timeline::canvas::PX_PER_MM;
-use crate::layout::{self, Engine, Layout};
+use crate::layout::Layout;
 use crate::mission::Mission;
 use crate::view::{View, Words, joined};
 pub use choice::Choice;
@@ -30,7 +30,7 @@ const GAP: f64 = 10.0;
 const ENLARGED: f64 = 1.2;
 const NARROWEST: f64 = 480.0;
 /// Shapes of panels that are tried on paper: height over width.
-const SHAPES: [f64; 4] = [0.4, 0.6, 1.0, 1.6];
+pub(crate) const SHAPES: [f64; 4] = [0.4, 0.6, 1.0, 1.6];
 /// The largest height of a strip over its width, if there is a choice.
 const HIGHEST: f64 = 1.3;
 
@@ -56,8 +56,8 @@ pub struct StripSource<'a> {
     pub style: &'a Style,
     /// The fonts for all text.
     pub fonts: &'a Fonts,
-    /// The engine for new layouts if space is scarce.
-    pub engine: &'a dyn Engine,
+    /// Other layouts of the graph, of which one may be more legible.
+    pub others: &'a [Layout],
 }
 
 /// The width of a strip.
@@ -82,8 +82,8 @@ pub fn strip(source: StripSource<'_>, choice: &Choice, width: StripWidth) -> Res
     };
     let windows = choice.places(source.view)?;
     let mut best: Option<(f64, PanelGrid, Picture<'_>)> = None;
-    for layout in source.layouts(width_mm.is_some()) {
-        let bare = source.bare(&layout);
+    for layout in std::iter::once(source.picture.layout()).chain(source.others) {
+        let bare = source.bare(layout);
         let page = PanelGrid::new(choice, windows.len(), &bare, width);
         // A page that is too high is rated as if it were shrunk to fit.
         let high = page.corner(windows.len().next_multiple_of(page.columns)).y;
@@ -215,26 +215,6 @@ impl PanelGrid {
 }
 
 impl<'a> StripSource<'a> {
-    /// Alternative layouts of the graph: as in the picture, and on paper, where space is scarce, for other
-    /// shapes of panels.
-    fn layouts(&self, on_paper: bool) -> Vec<Layout> {
-        let mut layouts = vec![self.picture.layout().clone()];
-        if on_paper {
-            let measured = Measured::new(self.view, self.style, self.fonts, PageOptions::default());
-            layouts.extend(SHAPES.map(|high| {
-                let page = Size::new(1000.0, 1000.0 * high);
-                let orientation = None;
-                let options = layout::LayoutOptions {
-                    page,
-                    orientation,
-                    ..layout::LayoutOptions::default()
-                };
-                layout::lay_out(measured.plan(), &options, self.engine)
-            }));
-        }
-        layouts
-    }
-
     /// The picture without title, legend and timeline, at its natural size.
     fn bare(&self, layout: &Layout) -> Picture<'a> {
         let options = PageOptions {

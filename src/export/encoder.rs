@@ -7,7 +7,7 @@ use super::palette::{Area, Palette};
 use super::sequence::{FrameTime, Sequence};
 use super::sink::{OutputSink, write_file};
 use super::target::Target;
-use crate::base::error::{Error, Result};
+use crate::base::error::Result;
 use crate::draw::paint::raster::Pixels;
 use crate::draw::scene::Scene;
 use crate::view::union;
@@ -88,39 +88,6 @@ impl Written {
     }
 }
 
-/// The drawings that a format of single drawings writes to a target.
-#[derive(Clone, Copy)]
-pub(crate) enum Single<'a> {
-    /// A file per window, or the only window.
-    Windows,
-    /// The strip in one file.
-    Strip(&'a Scene),
-}
-
-/// The drawings for a target: with `{n}`, or for one window, a file per window; else the strip, if there is one and
-/// `strip` allows it.
-pub(crate) fn single<'a>(
-    sequence: &Sequence<'a>,
-    target: &Target,
-    strip: bool,
-) -> Result<Single<'a>> {
-    let windows = sequence.view.frames.len();
-    if target.is_numbered() {
-        return Ok(Single::Windows);
-    }
-    match sequence.strip.filter(|_| strip) {
-        Some(scene) => Ok(Single::Strip(scene)),
-        None if windows <= 1 => Ok(Single::Windows),
-        None => Err(Error::usage(
-            format!(
-                "`{}` is one file for {windows} windows",
-                target.path().display()
-            ),
-            "put `{n}` into the name for a file per window, or use `--strip`",
-        )),
-    }
-}
-
 /// The writer of one output in a format. An unfinished output leaves no files when dropped.
 pub trait Encoder: Send {
     /// The data that it needs for every frame; none if it writes from the sequence at the end.
@@ -136,8 +103,8 @@ pub trait Encoder: Send {
     /// Begins, before the first packet, with the size of all frames and their palette.
     ///
     /// # Errors
-    /// [`Error::Io`] with the output's path if it cannot be written; [`Error::Output`] if the format cannot represent
-    /// it.
+    /// [`Error::Io`](crate::base::error::Error::Io) with the output's path if it cannot be written, or an error of output
+    /// if the format cannot represent it.
     fn begin(&mut self, _size: (u32, u32), _palette: &Palette) -> Result<()> {
         Ok(())
     }
@@ -145,7 +112,7 @@ pub trait Encoder: Send {
     /// Takes the packet of the next frame. `index` is the number of its window in the mission.
     ///
     /// # Errors
-    /// [`Error::Io`] with the output's path if it cannot be written.
+    /// [`Error::Io`](crate::base::error::Error::Io) with the output's path if it cannot be written.
     fn take(&mut self, _index: usize, _frame_time: FrameTime, _packet: Packet) -> Result<()> {
         Ok(())
     }
@@ -179,7 +146,7 @@ pub(crate) fn at_end<'a>(
 /// Begins an output of one file that takes no frames; `write` returns remarks for the user.
 ///
 /// # Errors
-/// [`Error::Usage`] with the reason for a name with `{n}`.
+/// [`Error::Usage`](crate::base::error::Error::Usage) with the reason for a name with `{n}`.
 pub(crate) fn one_file<'a>(
     target: &Target,
     reason: &str,
@@ -199,7 +166,7 @@ pub(crate) fn one_file<'a>(
 /// Begins an output of one text.
 ///
 /// # Errors
-/// [`Error::Usage`] for a name with `{n}`.
+/// [`Error::Usage`](crate::base::error::Error::Usage) for a name with `{n}`.
 pub(crate) fn one_text<'a>(
     target: &Target,
     text: impl FnOnce() -> String + Send + 'a,

@@ -5,12 +5,12 @@
 
 mod data;
 mod element_runs;
-pub(crate) mod encoder;
 mod signs;
 mod table;
 
 use std::fmt::Write as _;
 
+use super::{Started, one_text};
 use crate::base::digest;
 use crate::base::notice::NoticeKind;
 use crate::base::words;
@@ -20,10 +20,11 @@ use crate::draw::paint::svg;
 use crate::draw::paint::xml::Xml;
 use crate::draw::picture::title::SIDES;
 use crate::draw::picture::{Union, rate_label};
-use crate::draw::style::Style;
+use crate::draw::style::{BUILTIN, Style};
 use crate::draw::text;
 use crate::draw::topic_timeline::Overview;
-use crate::export::sequence::Sequence;
+use crate::export::sequence::{Sequence, UnionDrawings};
+use crate::export::target::Target;
 use crate::graph::Id as _;
 use crate::view::{ArrowId, ItemId, View};
 use element_runs::{ElementRuns, ViewRuns};
@@ -85,6 +86,48 @@ impl<'a> PageGraph<'a> {
             order,
         }
     }
+}
+
+/// Begins the page.
+///
+/// # Errors
+/// As [`one_text`].
+pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
+    let style = Style::builtin(BUILTIN[0].0)?;
+    one_text(target, move || page(sequence, &style))
+}
+
+/// The page with the graph of all elements separately, and the picture's if it groups elements; none for a timeline of
+/// topics.
+fn page(sequence: &Sequence<'_>, style: &Style) -> String {
+    let opened = sequence.unfolded;
+    let opened = opened.and_then(|opened| Some((opened.view, opened.picture?.graph()?)));
+    let has_picture = opened.is_none() || sequence.view.is_folded();
+    let picture = has_picture.then(|| sequence.picture.graph()).flatten();
+    let picture = picture.map(|drawings| (sequence.view, drawings));
+    let (whole, folded) = match opened {
+        Some(_) => (opened, picture),
+        None => (picture, None),
+    };
+    let overview = sequence.picture.overview();
+    // A chosen style is always used; the default one has a dark variant.
+    let chosen = whole.as_ref().map_or(style, |(_, drawn)| drawn.style);
+    let dark = Style::builtin("dark").ok().filter(|_| chosen == style);
+    let timeline = overview.as_ref().map_or("", |o| &o.title);
+    let title = sequence.picture.title().unwrap_or(timeline);
+    let graph = |(view, drawn): (_, UnionDrawings<'_>)| PageGraph::new(view, drawn.union);
+    // The timeline of topics has a row for each, even if a graph would group them.
+    let each = sequence.unfolded.map_or(sequence.view, |u| u.view);
+    let page = HtmlPage {
+        sequence,
+        whole: whole.map_or_else(|| PageGraph::new(each, Union::default()), graph),
+        folded: folded.map(graph),
+        style: chosen,
+        dark: dark.as_ref(),
+        title,
+        overview: overview.as_ref(),
+    };
+    page.write()
 }
 
 impl HtmlPage<'_> {
@@ -187,11 +230,7 @@ impl HtmlPage<'_> {
         for notice in self.sequence.notices.iter() {
             // The page has fonts for all characters, and all collapsed elements.
             if notice.kind != NoticeKind::Glyph {
-                let times = match notice.count {
-                    0 | 1 => String::new(),
-                    n => format!(" ({n} times)"),
-                };
-                let text = format!("{}{times}", visible(&notice.text));
+                let text = visible(&notice.text).into_owned() + &notice.times();
                 xml.open("li").text(&text).close();
             }
         }

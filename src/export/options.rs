@@ -48,10 +48,3 @@ impl Default for SequenceOptions {
         }
     }
 }
-
-impl SequenceOptions {
-    /// Whether one drawing of the whole was requested, which replaces a sequence.
-    pub fn is_one_drawing(&self) -> bool {
-        self.strip.is_some() || self.figure.is_some()
-    }
-}

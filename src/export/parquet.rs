@@ -20,7 +20,9 @@ use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use ::parquet::schema::types::{ColumnPath, Type, TypePtr};
 
 use crate::base::cast::to_f32;
-use crate::base::table::{Batch, ColumnKind, ColumnValues, TableColumn, TextColumn, span};
+use crate::base::table::{
+    Batch, ColumnKind, ColumnValues, TableColumn, TableWriter, TextColumn, span,
+};
 
 /// The most rows in a group, as in other writers.
 const MOST_ROWS: usize = 1 << 20;
@@ -68,9 +70,10 @@ impl<W: Write + Send> Rows<W> {
             waiting: Vec::new(),
         })
     }
+}
 
-    /// Writes all rows of `batch`.
-    pub(crate) fn write(&mut self, batch: &Batch) -> io::Result<()> {
+impl<W: Write + Send> TableWriter<W> for Rows<W> {
+    fn write(&mut self, batch: &Batch) -> io::Result<()> {
         if batch.rows == 0 {
             return Ok(());
         }
@@ -85,13 +88,12 @@ impl<W: Write + Send> Rows<W> {
         Ok(())
     }
 
-    /// The number of bytes of rows in memory.
-    pub(crate) fn held(&self) -> usize {
+    fn held(&self) -> usize {
         self.waiting.iter().map(memory).sum()
     }
 
     /// Writes the rows in memory as one group.
-    pub(crate) fn unload(&mut self) -> io::Result<()> {
+    fn unload(&mut self) -> io::Result<()> {
         let batches = std::mem::take(&mut self.waiting);
         if batches.is_empty() {
             return Ok(());
@@ -111,8 +113,7 @@ impl<W: Write + Send> Rows<W> {
         write().map_err(io::Error::other)
     }
 
-    /// Ends the table.
-    pub(crate) fn finish(mut self) -> io::Result<W> {
+    fn finish(mut self: Box<Self>) -> io::Result<W> {
         self.unload()?;
         self.writer.into_inner().map_err(io::Error::other)
     }

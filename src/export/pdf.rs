@@ -3,12 +3,12 @@
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
-use super::{Encoder, Needs, Pack, Packet, Started, Written};
+use super::{Encoder, Needs, OneDrawing, Pack, Packet, Started, Written};
 use crate::base::error::{Error, Result};
 use crate::base::words;
 use crate::draw::paint::pdf::{self, PdfPage};
 use crate::draw::scene::Scene;
-use crate::export::sequence::{FrameTime, Sequence};
+use crate::export::sequence::{FrameTime, Sequence, Shows};
 use crate::export::sink::write_file;
 use crate::export::target::Target;
 
@@ -35,7 +35,10 @@ pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<
     let fonts = sequence.fonts.clone();
     Ok(Box::new(Book {
         sequence,
-        strip: sequence.strip.filter(|_| sequence.options.is_one_drawing()),
+        strip: match sequence.shows(target, OneDrawing::Asked) {
+            Shows::Whole(scene) => Some(scene),
+            Shows::Film | Shows::Windows => None,
+        },
         target: target.clone(),
         sheets,
         press: thread::spawn(move || pdf::write(waiting.iter(), &fonts)),

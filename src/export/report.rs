@@ -1,36 +1,45 @@
 //! A report in Markdown for a pull request or a job summary: the changes with their times, drawn and in tables.
 
-mod changes;
-pub(crate) mod encoder;
-pub(crate) mod escape;
-mod graph;
-mod tables;
+mod chart;
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use crate::base::notice::Notices;
+use super::{Started, one_text};
+use crate::base::file;
+use crate::base::notice::{Notice, Notices};
 use crate::base::time::Stamp;
 use crate::base::words;
-use crate::draw::style::{BUILTIN, Style};
-use crate::export::mermaid;
+use crate::evidence::Evidence;
+use crate::export::markdown::{self, address, code, folded, plain, row};
 use crate::export::sequence::Sequence;
-use crate::view::{Counts, View};
-use escape::{address, plain};
+use crate::export::target::Target;
+use crate::graph::{Element, Elements, Existence, Graphs};
+use crate::mission::Mission;
+use crate::mission::event_log::Kind;
+use crate::mission::event_log::sentence_with;
+use crate::mission::info::{how_many, info};
+use crate::view::{Counts, Frame, Headline, View};
 
 /// The most bytes of each part; together they stay below 256 KiB, a quarter of the limit of a job summary.
 const MOST_CHANGES: usize = 96 << 10;
 const MOST_TABLE: usize = 40 << 10;
 const MOST_NOTICES: usize = 16 << 10;
-/// The most characters of a chart; a longer one is left out, as GitHub's Mermaid stops at 50,000.
-const MOST_CHART: usize = 45_000;
 
 /// The most expanded rows of a table; the rest is collapsed.
 const MOST_OPEN: usize = 20;
-/// The most edges of an expanded chart; larger ones are collapsed.
-const MOST_EDGES_OPEN: usize = 25;
+
+/// Begins the report; it follows the text already in the file if that is the file to append to.
+///
+/// # Errors
+/// As [`one_text`]; as [`file::text_before`] for the file to append to.
+pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
+    let before = file::text_before(target.path(), sequence.options.append_to.as_deref())?;
+    one_text(target, move || before + &report(sequence))
+}
 
 /// The report.
-pub(crate) fn report(sequence: &Sequence<'_>) -> String {
+fn report(sequence: &Sequence<'_>) -> String {
     let mission = sequence.mission;
     let view = sequence.unfolded.map_or(sequence.view, |all| all.view);
     let mut out = verdict(sequence, view) + "\n\n";
@@ -52,12 +61,12 @@ pub(crate) fn report(sequence: &Sequence<'_>) -> String {
             .iter()
             .find(|(name, _)| name == "player"),
     };
-    out.push_str(&changes::phases(mission, &times));
-    out.push_str(&changes::table(mission, view, &times));
-    out.push_str(&chart(view));
-    out.push_str(&tables::nodes(mission, view, MOST_TABLE));
-    out.push_str(&tables::topics(mission, view, MOST_TABLE));
-    out.push_str(&tables::evidence(mission));
+    out.push_str(&phases(mission, &times));
+    out.push_str(&changes(mission, view, &times));
+    out.push_str(&chart::chart(view));
+    out.push_str(&nodes(mission, view));
+    out.push_str(&topics(mission, view));
+    out.push_str(&evidence(mission));
     out.push_str(&notices(sequence.notices));
     out
 }
@@ -149,54 +158,268 @@ fn headline_counts(counts: &Counts) -> Vec<String> {
         .collect()
 }
 
-fn chart(view: &View) -> String {
-    let Some((seen, left_out)) = graph::changed(view) else {
+fn notices(notices: &Notices) -> String {
+    let line = |notice: Notice| format!("- {}\n", plain(&notice.text) + &notice.times());
+    let mut lines: Vec<String> = notices.iter().map(line).collect();
+    if markdown::cut(&mut lines, MOST_NOTICES) > 0 {
+        lines.push("- and more\n".to_owned());
+    }
+    if lines.is_empty() {
         return String::new();
-    };
-    // The picture's style may be dark, but Markdown has any background.
-    let Ok(style) = Style::builtin(BUILTIN[0].0) else {
-        return String::new();
-    };
-    let chart = mermaid::chart(view, &style, &seen);
-    if chart.len() > MOST_CHART {
-        return "The graph of the changes is too large for Markdown.\n\n".to_owned();
     }
-    let mut out = format!("```mermaid\n{}\n```\n\n", chart.trim_end());
-    out += "Solid green: present only at the end. Dashed orange: present only at the start. Purple: changed in between.\n";
-    if left_out > 0 {
-        let _ = writeln!(
-            out,
-            "\n{} left out of the graph.",
-            words::count(left_out, "edge")
-        );
-    }
-    let edges = words::count(seen.arrows.len(), "edge");
-    if seen.arrows.len() > MOST_EDGES_OPEN {
-        return tables::folded(&format!("Graph of the changes ({edges})"), &out);
-    }
-    format!("Changed elements and their neighbours:\n\n{out}\n")
+    folded("Notices", &lines.concat())
 }
 
-fn notices(notices: &Notices) -> String {
-    let mut out = String::new();
-    for notice in notices.iter() {
-        let times = if notice.count > 1 {
-            format!(" ({} times)", notice.count)
-        } else {
-            String::new()
-        };
-        let line = format!("- {}{times}\n", plain(&notice.text));
-        if out.len() + line.len() > MOST_NOTICES {
-            out.push_str("- and more\n");
-            break;
+/// A table of at most `most` bytes, whose last line states how many rows were cut; `None` without rows.
+fn table(heads: &[&str], mut rows: Vec<String>, most: usize) -> Option<String> {
+    if rows.is_empty() {
+        return None;
+    }
+    let heading = markdown::table(heads, &[]).len();
+    let cut = markdown::cut(&mut rows, most.saturating_sub(heading));
+    let mut out = markdown::table(heads, &rows);
+    if cut > 0 {
+        let _ = writeln!(out, "\n{} more left out.", words::count(cut, "row"));
+    }
+    Some(out)
+}
+
+/// Such a table, collapsed; nothing without rows.
+fn folded_table(summary: &str, heads: &[&str], rows: Vec<String>, most: usize) -> String {
+    let table = table(heads, rows, most);
+    table.map_or_else(String::new, |table| folded(summary, &table))
+}
+
+/// The most names listed per kind.
+const MOST_NAMES: usize = 12;
+/// The most events of a window that are listed separately.
+const MOST_LISTED: usize = 12;
+
+/// The phases, collapsed; nothing if there is only one.
+fn phases(mission: &Mission, times: &ReportTimes<'_>) -> String {
+    let phases = &mission.log.phases;
+    if phases.len() < 2 {
+        return String::new();
+    }
+    let rows = phases.iter().zip(1..).map(|(phase, n)| {
+        let from = times.link(phase.span.start);
+        let long = words::duration(phase.span.nanos());
+        row(&[n.to_string(), from, long, plain(&phase.name)])
+    });
+    let summary = words::count(phases.len(), "phase");
+    let heads = ["Phase", "From", "For", "Name"];
+    folded_table(&summary, &heads, rows.collect(), MOST_CHANGES)
+}
+
+/// The windows with changes; those beyond the first ones are collapsed.
+fn changes(mission: &Mission, view: &View, times: &ReportTimes<'_>) -> String {
+    let frames = view.frames.iter().filter(|f| !f.headlines.is_empty());
+    let rows = frames.map(|frame| {
+        let window = times.link(frame.span.start);
+        row(&[window, changes_of(mission, frame)])
+    });
+    let mut open: Vec<String> = rows.collect();
+    let rest = open.split_off(open.len().min(MOST_OPEN));
+    let heads = ["Window", "Changes"];
+    let table = table(&heads, open, MOST_CHANGES / 2);
+    let summary = format!("{} more with changes", words::count(rest.len(), "window"));
+    let rest = folded_table(&summary, &heads, rest, MOST_CHANGES / 2);
+    table.map_or(String::new(), |table| table + "\n") + &rest
+}
+
+/// The kinds of headlines that are grouped, with their labels.
+const TOGETHER: [(Kind, &str, &str); 5] = [
+    (Kind::Started, "node", "started"),
+    (Kind::Stopped, "node", "stopped"),
+    (Kind::Restarted, "node", "restarted"),
+    (Kind::Appeared, "connection", "made"),
+    (Kind::Vanished, "connection", "ended"),
+];
+
+/// The changes of a window as Markdown: `2 nodes started: /a, /b; /t handed over: /a → /b`.
+fn changes_of(mission: &Mission, frame: &Frame) -> String {
+    let elements = &mission.elements;
+    let mut parts = Vec::new();
+    for (kind, word, what) in TOGETHER {
+        let of_kind = frame.headlines.iter().filter(|h| h.kind == kind);
+        let all: Vec<&Headline> = of_kind.filter(|h| is_together(h)).collect();
+        if !all.is_empty() {
+            let names: Vec<String> = all.iter().map(|h| plain(&name(elements, h.what))).collect();
+            let count = words::count(all.len(), word);
+            let names = words::some_of(&names, MOST_NAMES);
+            parts.push(format!("{count} {what}: {names}"));
         }
-        out.push_str(&line);
     }
-    if out.is_empty() {
-        out
-    } else {
-        tables::folded("Notices", &out)
+    let rest: Vec<&Headline> = frame.headlines.iter().filter(|h| !is_together(h)).collect();
+    for headline in rest.iter().take(MOST_LISTED) {
+        let event = mission.log.events.get(headline.event);
+        parts.extend(event.map(|event| plain(&sentence_with(mission, &[], event))));
     }
+    if rest.len() > MOST_LISTED {
+        parts.push(format!("and {} more", rest.len() - MOST_LISTED));
+    }
+    parts.join("; ")
+}
+
+/// Whether headlines of this kind are grouped; topics of unknown publishers appear and vanish separately.
+fn is_together(headline: &Headline) -> bool {
+    let kinds = TOGETHER.iter().any(|(kind, ..)| *kind == headline.kind);
+    kinds && !headline.what.is_topic()
+}
+
+/// The name of an element: the role of a node, the name of a topic, both ends of an edge.
+fn name(elements: &Elements, what: Element) -> String {
+    let (node, topic) = elements.ends(what);
+    let node = node.map(|id| &*elements.nodes[id].role);
+    let topic = topic.map(|id| elements.topics[id].name.as_str());
+    match (node, topic, what) {
+        (Some(node), Some(topic), Element::Subscribe(_)) => format!("{topic} → {node}"),
+        (Some(node), Some(topic), _) => format!("{node} → {topic}"),
+        (node, topic, _) => node.or(topic).unwrap_or_default().to_owned(),
+    }
+}
+
+/// The number of windows that contain an element, with its messages and the sum of its rates in them.
+#[derive(Default)]
+struct WindowsOf {
+    windows: usize,
+    messages: u64,
+    hz: f64,
+    rated: usize,
+}
+
+impl WindowsOf {
+    fn new(graphs: &Graphs, what: Element) -> Self {
+        let mut all = Self::default();
+        for (at, row) in graphs.rows(what) {
+            all.windows += 1;
+            all.messages += row.count.unwrap_or(0);
+            if let Some(hz) = row.hz(graphs.spans()[at]) {
+                all.hz += hz;
+                all.rated += 1;
+            }
+        }
+        all
+    }
+
+    fn mean(&self) -> String {
+        match self.rated {
+            0 => "–".to_owned(),
+            n => words::number(self.hz / n as f64),
+        }
+    }
+}
+
+fn seen(mission: &Mission, seen: &Existence) -> String {
+    let at = |t: Stamp| words::offset_seconds(mission.offset(t));
+    match (seen.first, seen.last) {
+        (Some(first), Some(last)) => format!("{} – {}", at(first), at(last)),
+        _ => "–".to_owned(),
+    }
+}
+
+/// The kinds of its evidence, without those common to all elements.
+fn known_by(evidence: Evidence) -> String {
+    let words = evidence.words().filter(|word| *word != "rosout_rule");
+    words.collect::<Vec<_>>().join(", ")
+}
+
+/// The elements that a view shows.
+fn shown(view: &View) -> BTreeSet<Element> {
+    view.items
+        .iter()
+        .flat_map(|item| item.members.iter().copied())
+        .collect()
+}
+
+/// Every node that is shown.
+fn nodes(mission: &Mission, view: &View) -> String {
+    let shown = shown(view);
+    let all = mission.elements.nodes.with_ids();
+    let all = all.filter(|(id, _)| shown.contains(&Element::Node(*id)));
+    let rows = all.map(|(id, node)| {
+        let there = WindowsOf::new(&mission.graphs, Element::Node(id));
+        row(&[
+            code(node.name.as_str()),
+            seen(mission, &node.seen),
+            there.windows.to_string(),
+            there.mean(),
+            known_by(node.seen.evidence),
+        ])
+    });
+    let rows: Vec<String> = rows.collect();
+    let heads = ["Node", "Seen", "Windows", "Hz sent on average", "Known by"];
+    folded_table(&words::count(rows.len(), "node"), &heads, rows, MOST_TABLE)
+}
+
+/// Every topic that is shown.
+fn topics(mission: &Mission, view: &View) -> String {
+    let shown = shown(view);
+    let all = mission.elements.topics.with_ids();
+    let all = all.filter(|(id, _)| shown.contains(&Element::Topic(*id)));
+    let rows = all.map(|(id, topic)| {
+        let there = WindowsOf::new(&mission.graphs, Element::Topic(id));
+        let types: Vec<String> = topic.types.iter().map(|t| code(t)).collect();
+        row(&[
+            code(topic.name.as_str()),
+            types.join(", "),
+            seen(mission, &topic.seen),
+            there.windows.to_string(),
+            there.messages.to_string(),
+            there.mean(),
+            known_by(topic.seen.evidence),
+        ])
+    });
+    let rows: Vec<String> = rows.collect();
+    let heads = [
+        "Topic",
+        "Type",
+        "Seen",
+        "Windows",
+        "Messages",
+        "Hz on average",
+        "Known by",
+    ];
+    folded_table(&words::count(rows.len(), "topic"), &heads, rows, MOST_TABLE)
+}
+
+/// The strength of the evidence for the graph, as sentences, and the bags.
+fn evidence(mission: &Mission) -> String {
+    let info = info(mission);
+    let parts = [
+        ("node", info.nodes_by_degree),
+        ("publication", info.publishes_by_degree),
+        ("subscription", info.subscribes_by_degree),
+    ];
+    let parts = parts.map(|(word, confidences)| how_many(word, confidences));
+    let with = info.topics.iter().filter(|t| t.count > 0).count();
+    let mut out = format!(
+        "Known are {}. Of {} with messages, {} have a known publisher and {} a known subscriber.\n\n",
+        parts.join(", "),
+        words::count(with, "topic"),
+        with.saturating_sub(info.topics_without_publisher),
+        with.saturating_sub(info.topics_without_subscriber),
+    );
+    for line in &info.advice {
+        let _ = writeln!(out, "- to learn more: {}", plain(line));
+    }
+    for bag in mission.bags.iter().take(50) {
+        let state = if bag.complete {
+            "complete"
+        } else {
+            "incomplete"
+        };
+        let _ = writeln!(
+            out,
+            "- {}: {}, {state}",
+            plain(&bag.name),
+            plain(&bag.format)
+        );
+    }
+    folded(
+        "Strength of the evidence",
+        &(out.trim_end().to_owned() + "\n"),
+    )
 }
 
 #[cfg(test)]

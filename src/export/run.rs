@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use self::raster_pool::{FrameWant, Packed, RasterPool};
 use crate::base::error::{Error, Result};
-use crate::export::check;
+use crate::export::check::make_folder;
 use crate::export::palette::Palette;
 use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::{Encoder, Needs, Output, Packet, Written};
@@ -32,7 +32,7 @@ pub fn run(
     progress: &mut Progress<'_>,
 ) -> Result<Vec<Written>> {
     for output in outputs {
-        check::make_folder(&output.target)?;
+        make_folder(&output.target)?;
     }
     let outcomes = pass(sequence, outputs, progress)?;
     let each = outputs.iter().zip(outcomes);

@@ -5,6 +5,8 @@ pub use super::options::SequenceOptions;
 pub use crate::draw::timeline::Timeline;
 pub use crate::draw::topic_timeline::Overview;
 
+use super::OneDrawing;
+use super::target::Target;
 use crate::base::notice::Notices;
 use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Picture, Union};
@@ -18,7 +20,9 @@ use crate::view::{Frame, View};
 /// The drawings of the windows of a sequence.
 pub trait Drawings: Sync {
     /// The drawing of a window, an index into [`View::frames`]; all drawings have the same size.
-    fn scene(&self, window: usize) -> Scene;
+    fn scene(&self, _window: usize) -> Scene {
+        Scene::default()
+    }
 
     /// The title of the drawing of a graph; `None` for other drawings.
     fn title(&self) -> Option<&str> {
@@ -35,6 +39,9 @@ pub trait Drawings: Sync {
         None
     }
 }
+
+/// No drawings, for outputs that show none.
+impl Drawings for () {}
 
 /// The graph of all windows, drawn once.
 #[derive(Clone, Debug)]
@@ -123,7 +130,33 @@ pub struct FrameTime {
     pub ms: u32,
 }
 
-impl Sequence<'_> {
+/// What an output shows of a sequence.
+#[derive(Clone, Copy)]
+pub(crate) enum Shows<'a> {
+    /// All windows in one animation.
+    Film,
+    /// A drawing per window, or that of the only window.
+    Windows,
+    /// One drawing of the whole mission.
+    Whole(&'a Scene),
+}
+
+impl<'a> Sequence<'a> {
+    /// What a target shows whose format can contain one drawing of the whole as `whole` says.
+    pub(crate) fn shows(&self, target: &Target, whole: OneDrawing) -> Shows<'a> {
+        let is_whole = match whole {
+            OneDrawing::Never => false,
+            OneDrawing::Asked => self.options.strip.is_some() || self.options.figure.is_some(),
+            OneDrawing::Always => true,
+        };
+        match self.strip.filter(|_| is_whole) {
+            _ if target.is_numbered() => Shows::Windows,
+            Some(scene) => Shows::Whole(scene),
+            None if self.view.frames.len() > 1 => Shows::Film,
+            None => Shows::Windows,
+        }
+    }
+
     /// The frames in order: of an animation (`is_film`), or of files with a window each. A long time without messages is one
     /// frame.
     pub fn frame_times(&self, is_film: bool) -> Vec<FrameTime> {

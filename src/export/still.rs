@@ -4,12 +4,12 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder as _};
 
-use super::{DrawnFrame, Encoder, Needs, Pack, Packet, Single, Started, Written, single};
+use super::{DrawnFrame, Encoder, Needs, Pack, Packet, Written};
 use crate::base::error::{Error, Result};
 use crate::draw::paint::raster::Pixels;
 use crate::draw::paint::svg;
 use crate::draw::scene::Scene;
-use crate::export::sequence::{FrameTime, Sequence};
+use crate::export::sequence::{FrameTime, Sequence, Shows};
 use crate::export::sink::write_file;
 use crate::export::target::Target;
 
@@ -34,29 +34,24 @@ struct Images<'a> {
     written: Written,
 }
 
-/// Begins the drawings, one per window; without `{n}` the single window or the strip.
-///
-/// # Errors
-/// As [`single`].
+/// Begins the drawings: one of the whole, or one per window.
 pub(crate) fn start<'a>(
     sequence: &'a Sequence<'a>,
     target: &Target,
     kind: StillKind,
-) -> Started<'a> {
-    // Several windows in one SVG are an animation, unless they are asked for as one drawing.
-    let may_be_strip = kind != StillKind::Svg || sequence.options.is_one_drawing();
-    let strip = match single(sequence, target, may_be_strip)? {
-        Single::Windows => None,
-        Single::Strip(scene) => Some(scene),
-    };
-    Ok(Box::new(Images {
+    shows: Shows<'a>,
+) -> Box<dyn Encoder + 'a> {
+    Box::new(Images {
         kind,
         sequence,
-        strip,
+        strip: match shows {
+            Shows::Whole(scene) => Some(scene),
+            Shows::Film | Shows::Windows => None,
+        },
         target: target.clone(),
         windows: sequence.view.frames.len(),
         written: Written::to(target),
-    }))
+    })
 }
 
 impl Images<'_> {

@@ -4,7 +4,6 @@
 
 pub(crate) mod folder;
 mod mission;
-mod seen;
 pub(crate) mod writer;
 
 use std::io::Write as _;
@@ -18,7 +17,7 @@ use crate::export::target::{Target, is_special};
 use crate::mission::Mission;
 use mission::{RowTaker, TABLES, Table};
 pub use writer::TableFormat;
-use writer::Writer;
+use writer::begin;
 
 /// Checks whether several files can be derived from this name.
 ///
@@ -94,7 +93,7 @@ fn write(
     let sink = OutputSink::create(target, None)?;
     let failed = Error::io("write", sink.path());
     let write = || {
-        let mut writer = Writer::new(format, sink, &batch, &[])?;
+        let mut writer = begin(format, sink, &batch, &[])?;
         let mut result = Ok(());
         rows(&mut |row: &[TableCell<'_>]| {
             batch.push(row);

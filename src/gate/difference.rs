@@ -1,7 +1,6 @@
 //! The differences between two missions: in nodes, topics and edges, in rates and times of messages, and in events.
 
 mod picture;
-mod report;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,7 +17,6 @@ use crate::mission::Mission;
 use crate::mission::event_log::{Event, Kind};
 
 pub(crate) use picture::{Side, pairs, union};
-pub use report::{DiffFormat, DiffSubject};
 
 /// An end is certain if the silence after it is this many times its uncertainty.
 const DOUBTS: i64 = 8;
@@ -35,6 +33,15 @@ const UNEVEN_CHANGE: f64 = 0.5;
 const FEWEST_OF_TIMES: u64 = 20;
 /// The longest silence of a topic, times this, is the uncertainty of its first and its last message.
 const SILENCES: i64 = 2;
+
+/// The two missions as given.
+#[derive(Clone, Debug)]
+pub struct DiffSubject {
+    /// The name of the first.
+    pub first: String,
+    /// The name of the second.
+    pub second: String,
+}
 
 /// Which of two missions contain an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]

@@ -348,15 +348,12 @@ struct File {
 /// # Errors
 /// [`crate::Error::BadFile`] for a text that is not YAML, expands too far, or contains an unknown key or word.
 pub(crate) fn read(text: &str, path: &Path) -> Result<Expectation> {
-    parse(text, path).map_err(|bad| Error::BadFile {
-        path: path.to_owned(),
-        line: bad.at.line,
-        column: bad.at.column,
-        reason: bad.reason,
-        hint: match bad.hint {
-            hint if hint.is_empty() => "the file must be YAML: `name: {key: value}`".to_owned(),
+    parse(text, path).map_err(|bad| {
+        let hint = match bad.hint.as_str() {
+            "" => "the file must be YAML: `name: {key: value}`",
             hint => hint,
-        },
+        };
+        Error::bad_place(path, [bad.at.line, bad.at.column], &bad.reason, hint)
     })
 }
 

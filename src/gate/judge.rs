@@ -117,10 +117,10 @@ pub(crate) fn judge(expectation: &Expectation, mission: &Mission, is_part: bool)
         searched: Cell::new(0),
     };
     for named in &expectation.nodes {
-        judge.named(named, &NODES);
+        judge.named(named, true);
     }
     for named in &expectation.topics {
-        judge.named(named, &TOPICS);
+        judge.named(named, false);
     }
     for rule in &expectation.rules {
         judge.rule(rule);
@@ -151,28 +151,6 @@ struct Judge<'a> {
     searched: Cell<usize>,
 }
 
-/// How the elements of a section are checked.
-struct Section {
-    word: &'static str,
-    forbidden: fn(&Judge<'_>, &Pattern, YamlPlace) -> Vec<Finding>,
-    presence: fn(&Judge<'_>, &Pattern, YamlPlace, &Entry) -> Vec<Finding>,
-    /// The facts other than presence, whose titles begin with this text.
-    facts: fn(&mut Judge<'_>, &str, &Pattern, &Entry),
-}
-
-const NODES: Section = Section {
-    word: "node",
-    forbidden: |judge, name, at| judge.forbidden_nodes(name, at),
-    presence: |judge, name, at, entry| judge.node_presence(name, at, entry),
-    facts: |judge, title, name, entry| judge.node_facts(title, name, entry),
-};
-const TOPICS: Section = Section {
-    word: "topic",
-    forbidden: |judge, name, at| judge.forbidden_topics(name, at),
-    presence: |judge, name, at, entry| judge.topic_presence(name, at, entry),
-    facts: |judge, title, name, entry| judge.topic_facts(title, name, entry),
-};
-
 /// The number of events that are written out.
 const MOST_LISTED: usize = 6;
 /// The number of names that are reported in one line.
@@ -189,18 +167,26 @@ impl Judge<'_> {
         Some(format!("the nearest name in the bag is `{}`", near??))
     }
 
-    /// Checks an element of the file.
-    fn named(&mut self, named: &Named, section: &Section) {
+    /// Checks a node of the file, or a topic.
+    fn named(&mut self, named: &Named, is_node: bool) {
         let (name, at, entry) = (&named.name, named.at, &named.facts);
-        let title = format!("{} {name}", section.word);
+        let title = format!("{} {name}", if is_node { "node" } else { "topic" });
         let before = self.checks.len();
+        let found = match (is_node, entry.forbidden) {
+            (true, true) => self.forbidden_nodes(name, at),
+            (true, false) => self.node_presence(name, at, entry),
+            (false, true) => self.forbidden_topics(name, at),
+            (false, false) => self.topic_presence(name, at, entry),
+        };
         if entry.forbidden {
-            let found = (section.forbidden)(self, name, at);
             self.note(title + " forbidden", at, found);
         } else {
-            let found = (section.presence)(self, name, at, entry);
             self.note(&title, at, found);
-            (section.facts)(self, &title, name, entry);
+            if is_node {
+                self.node_facts(&title, name, entry);
+            } else {
+                self.topic_facts(&title, name, entry);
+            }
         }
         for finding in self.found_since(before) {
             finding.accept = Some(name.to_string());

@@ -1,11 +1,13 @@
-//! Verdicts in formats for people, for programs, and for CI services.
+//! Verdicts and differences in formats for people, for programs, and for CI services.
 
 mod data;
-mod markdown;
+mod differences;
+mod summary;
 mod text;
 
 use std::collections::BTreeMap;
 
+use super::difference::{DiffSubject, Difference};
 use super::finding::{Finding, FindingKind, KINDS, Severity};
 use super::judge::Verdict;
 use crate::base::columns::hang;
@@ -26,27 +28,29 @@ pub(crate) struct Subject<'a> {
     pub(crate) tracked: String,
 }
 
-/// A format of a verdict.
+/// A format of verdicts, and perhaps of differences.
 #[derive(Clone, Copy, Debug)]
-pub struct CheckFormat {
+pub struct ReportFormat {
     /// Its name in `--format` and before a colon in `-o`.
     pub(crate) word: &'static str,
     /// Its file extensions.
     pub(crate) endings: &'static [&'static str],
     /// Its description, for the help.
     pub(crate) what: &'static str,
-    pub(crate) write: fn(&Subject<'_>, &Verdict) -> String,
+    pub(crate) verdict: fn(&Subject<'_>, &Verdict) -> String,
+    pub(crate) differences: Option<fn(&DiffSubject, &[Difference]) -> String>,
 }
 
-/// All formats. Extensions are matched in this order.
-pub(crate) const FORMATS: &[CheckFormat] = &[
-    CheckFormat {
+/// All formats.
+pub(crate) const FORMATS: &[ReportFormat] = &[
+    ReportFormat {
         word: "text",
         endings: &[".txt"],
         what: "for people: findings with file and line, grouped by cause",
-        write: text::text,
+        verdict: text::text,
+        differences: Some(differences::text),
     },
-    CheckFormat {
+    ReportFormat {
         word: "gitlab",
         endings: &[
             "codequality.json",
@@ -54,42 +58,48 @@ pub(crate) const FORMATS: &[CheckFormat] = &[
             "code-quality.json",
         ],
         what: "GitLab's code quality; also called codequality",
-        write: data::gitlab,
+        verdict: data::gitlab,
+        differences: None,
     },
-    CheckFormat {
+    ReportFormat {
         word: "json",
         endings: &[".json"],
         what: "everything, for programs",
-        write: data::json,
+        verdict: data::json,
+        differences: Some(differences::json),
     },
-    CheckFormat {
+    ReportFormat {
         word: "markdown",
         endings: &[".md", ".markdown"],
         what: "a summary for a pull request, with the graph around the changes",
-        write: markdown::write,
+        verdict: summary::write,
+        differences: Some(differences::markdown),
     },
-    CheckFormat {
+    ReportFormat {
         word: "junit",
         endings: &[".xml"],
         what: "a test case for every fact of the file",
-        write: data::junit,
+        verdict: data::junit,
+        differences: None,
     },
-    CheckFormat {
+    ReportFormat {
         word: "sarif",
         endings: &[".sarif", ".sarif.json"],
         what: "SARIF 2.1.0, for code scanning",
-        write: data::sarif,
+        verdict: data::sarif,
+        differences: None,
     },
-    CheckFormat {
+    ReportFormat {
         word: "github",
         endings: &[],
         what: "GitHub's annotations, then the text",
-        write: text::github,
+        verdict: text::github,
+        differences: None,
     },
 ];
 
-impl CheckFormat {
-    /// The format of a word: `text`, `json`, `markdown`, `junit`, `sarif`, `github` or `gitlab`.
+impl ReportFormat {
+    /// The format of a word: `text`, `json` and `markdown`; of verdicts also `junit`, `sarif`, `github` and `gitlab`.
     pub fn from_word(word: &str) -> Option<&'static Self> {
         let word = match word {
             "codequality" => "gitlab",
@@ -99,14 +109,27 @@ impl CheckFormat {
         FORMATS.iter().find(|f| f.word == word)
     }
 
-    /// The format of a file name: the one with the longest matching extension.
-    pub(crate) fn of_name(name: &str) -> Option<&'static Self> {
+    /// The format of a file name, among these: the one with the longest matching extension.
+    pub(crate) fn of_name(name: &str, fits: fn(&Self) -> bool) -> Option<&'static Self> {
         let name = name.to_ascii_lowercase();
         let endings = |f: &'static Self| f.endings.iter().map(move |ending| (*ending, f));
-        let fitting = FORMATS.iter().flat_map(endings);
-        let fitting = fitting.filter(|(ending, _)| name.ends_with(ending));
+        let all = FORMATS.iter().filter(|f| fits(f)).flat_map(endings);
+        let fitting = all.filter(|(ending, _)| name.ends_with(ending));
         let longest = fitting.max_by_key(|(ending, _)| ending.len());
         longest.map(|(_, format)| format)
+    }
+}
+
+/// A text without GitHub's commands: its runners interpret this anywhere in a line.
+fn inert_groups(text: &str) -> String {
+    text.replace("##[", "#\\#[")
+}
+
+/// A cell of a table in Markdown.
+fn cell(text: &str, escaped: fn(&str) -> String) -> String {
+    match text {
+        "" => "–".to_owned(),
+        text => escaped(text),
     }
 }
 

@@ -161,17 +161,10 @@ pub(super) fn no_messages(inputs: &[Input], notices: &Notices) -> Error {
         .take(3)
         .map(|n| format!("{} (×{})", n.text, n.count))
         .collect();
-    Error::NoMessages {
-        path: inputs
-            .iter()
-            .map(Input::name)
-            .min()
-            .unwrap_or_default()
-            .into(),
-        hint: if lost.is_empty() {
-            NOTHING_RECORDED.to_owned()
-        } else {
-            lost.join("; ")
-        },
-    }
+    let name = inputs.iter().map(Input::name).min().unwrap_or_default();
+    let hint = match &lost[..] {
+        [] => NOTHING_RECORDED.to_owned(),
+        lost => lost.join("; "),
+    };
+    Error::no_messages(&name, hint)
 }

@@ -1,6 +1,7 @@
 //! Draws the requested figure and generates its LaTeX code. Those of the graph are the picture at paper size.
 
-use super::fit::compose;
+use super::compose::Composed;
+use super::fit::fitted;
 use super::{Drawing, Medium, Watch};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
@@ -10,7 +11,7 @@ use crate::base::words;
 use crate::draw::figure::page::{FigureSheet, nothing};
 use crate::draw::figure::steps::{StepPanel, graph_width};
 use crate::draw::figure::{self, Figure, FigureKind, graph, steps};
-use crate::draw::picture::{Measured, PageOptions};
+use crate::draw::picture::PageOptions;
 use crate::draw::scene::Scene;
 use crate::draw::timeline::canvas::PX_PER_MM;
 use crate::draw::timeline::source::FigureSource;
@@ -18,11 +19,11 @@ use crate::draw::timeline::{drawer::clock, phases::title};
 use crate::export::Output;
 use crate::export::options::FigureOptions;
 use crate::graph::Element;
-use crate::layout::{LayoutOptions, lay_out};
+use crate::layout::LayoutOptions;
 use crate::mission::Mission;
 use crate::mission::event_log::Detail;
 use crate::view::news::News;
-use crate::view::{Mark, Mode, View, ViewOptions, view};
+use crate::view::{Mark, Mode, View, ViewOptions};
 
 /// The most namespaces that a remark names.
 const MOST_NAMED: usize = 3;
@@ -101,7 +102,7 @@ fn of_graph(
     let mission = sheet.source.mission;
     let mut drawing = on_paper(sheet, drawing, sheet.options.width_mm);
     drawing.view.is_still = Some(true);
-    let composed = compose(mission, &drawing, watch);
+    let composed = fitted(mission, &drawing, watch);
     if composed.view.items.is_empty() {
         return Err(nothing(sheet.source));
     }
@@ -111,12 +112,7 @@ fn of_graph(
             "draw `--kind lives` instead, or add connections with `--topology FILE`",
         ));
     }
-    let measured = Measured::new(
-        &composed.view,
-        &drawing.style,
-        &drawing.fonts,
-        composed.page,
-    );
+    let measured = composed.measured(&drawing);
     let is_legible = measured.text_px(&composed.layout) >= drawing.readable();
     if !is_legible {
         let width = sheet.options.width_mm;
@@ -140,7 +136,7 @@ fn of_graph(
         format!("not all nodes fit, so that each of these namespaces is one box: {names}")
     };
     let remarks = (!folded.is_empty()).then(remark).into_iter().collect();
-    let picture = measured.with(composed.layout).scene(0);
+    let picture = composed.picture(&drawing).scene(0);
     Ok((graph::page(sheet, picture), remarks))
 }
 
@@ -165,9 +161,9 @@ fn of_steps(sheet: &FigureSheet<'_>, drawing: &Drawing) -> Result<Scene> {
     let middles: Vec<Stamp> = (1..many - 1).map(middle).collect();
     let mission = source.mission.joined(&middles);
     let drawing = on_paper(sheet, drawing, sheet.options.width_mm);
-    let whole = view(&mission, &drawing.view).0;
+    let whole = Composed::new(&mission, drawing.view.clone(), drawing.page.clone());
     let all: Vec<(usize, News)> = (1..many)
-        .filter_map(|k| Some((k, whole.news(k - 1)?)))
+        .filter_map(|k| Some((k, whole.view.news(k - 1)?)))
         .collect();
     let mut chosen = chosen(sheet, &all)?;
     let mm = sheet.options.width_mm;
@@ -259,27 +255,24 @@ fn narrowest(drawing: &Drawing, news: &News, width_mm: f64) -> Option<(usize, Sc
 
 /// The lowest drawing of a step that is at most this wide in pixels, without anything around it; `None` if none is.
 fn narrow(drawing: &Drawing, view: &View, width: f64) -> Option<Scene> {
-    let (style, fonts) = (&drawing.style, &drawing.fonts);
-    let margin = style.page.margin * drawing.page.unit.unwrap_or(1.0);
+    let margin = drawing.style.page.margin * drawing.page.unit.unwrap_or(1.0);
     let scale = drawing.page.largest.unwrap_or(1.0);
-    let bare = |size: Size| PageOptions {
-        size,
-        bare: true,
-        ..drawing.page.clone()
-    };
-    let measured = |size| Measured::new(view, style, fonts, bare(size));
-    let plan = measured(Size::new(width, width));
-    let room = (width - 2.0 * margin) / scale;
-    let layouts = SHAPES.map(|shape| {
-        let page = Size::new(room, room * shape);
-        let options = LayoutOptions {
-            page,
-            least: 1.0,
-            ..LayoutOptions::default()
+    let measured = |size: Size| {
+        let page = PageOptions {
+            size,
+            ..drawing.page.clone()
         };
-        lay_out(plan.plan(), &options, drawing.engine)
-    });
-    let fitting = layouts.into_iter().filter(|layout| layout.size.w <= room);
+        drawing.measured(view, page)
+    };
+    let room = (width - 2.0 * margin) / scale;
+    let page = LayoutOptions {
+        page: Size::new(room, room),
+        least: 1.0,
+        ..LayoutOptions::default()
+    };
+    let any = measured(Size::new(width, width));
+    let layouts = drawing.of_shapes(any.plan(), &page, &SHAPES).into_iter();
+    let fitting = layouts.filter(|layout| layout.size.w <= room);
     let layout = fitting.min_by(|a, b| a.size.h.total_cmp(&b.size.h))?;
     let size = Size::new(
         layout.size.w * scale + 2.0 * margin,

@@ -1,22 +1,20 @@
 //! Makes a drawing legible: enlarges the page, draws topics as lines, collapses constant elements, then changing ones.
 
-mod crop;
-mod notices;
-
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::draw::{Composed, Drawing, known};
-use super::{Stage, Watch};
+use super::compose::Composed;
+use super::{Drawing, Stage, Watch};
 use crate::base::geometry::Size;
+use crate::base::name::lies_in;
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::draw::picture::{self, Measured, PageOptions};
+use crate::base::words;
+use crate::draw::picture::{self, PageOptions};
 use crate::draw::style::Style;
 use crate::graph::Element;
-use crate::layout::{Engine, Layout, LayoutOptions, Plan, extend, lay_out};
+use crate::layout::{Layout, LayoutOptions, Plan};
 use crate::mission::Mission;
-use crate::view::{Collapsible, ItemId, Mode, View, ViewOptions, headlines, outline, view};
-use notices::{parts, reported, so_that};
+use crate::view::{Collapsible, ItemId, Mode, ViewOptions, headlines};
 
 /// The style used to decide what is drawn.
 const PLAIN: &str = "light";
@@ -34,14 +32,15 @@ const SMALL: f64 = 0.7;
 const MOST_REOPENED: usize = 24;
 
 /// A namespace, and those of its boxes that stay outside when it is collapsed.
-type Spared = (Arc<str>, Vec<Arc<str>>);
+struct Spared {
+    space: Arc<str>,
+    outside: Vec<Arc<str>>,
+}
 
-/// The best drawing so far, with its page and options.
+/// The best drawing so far.
 struct Fitting<'a> {
     mission: &'a Mission,
     drawing: &'a Drawing,
-    page: PageOptions,
-    options: ViewOptions,
     best: Attempt,
     layouts: Layouts,
 }
@@ -49,7 +48,7 @@ struct Fitting<'a> {
 /// Chooses what is shown and lays it out on a page. `--fit auto` enlarges the page, then collapses namespaces, those
 /// with the fewest changes first, until the smallest text is legible or nothing is left to collapse; then it bundles
 /// topics if necessary, and reopens namespaces that fit after all.
-pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watch) -> Composed {
+pub(super) fn fitted(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watch) -> Composed {
     watch.stage(Stage::Layout);
     // The choice of elements does not depend on the style.
     let style = Style::builtin(PLAIN).unwrap_or_else(|_| drawing.style.clone());
@@ -60,38 +59,32 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
         },
         ..drawing.clone()
     };
-    let is_styled = plain.style != drawing.style;
     let (asked, drawing) = (drawing, &plain);
-    let (page, options) = (drawing.page.clone(), drawing.view.clone());
     let mut layouts = Layouts::default();
-    let best = Attempt::new(mission, drawing, (&options, &page), &mut layouts);
+    let (options, page) = (drawing.view.clone(), drawing.page.clone());
     let mut fitting = Fitting {
         mission,
         drawing,
-        page,
-        options,
-        best,
+        best: Attempt::new(mission, drawing, options, page, &mut layouts),
         layouts,
     };
     fitting.take_higher_page();
     if drawing.is_fitted && !fitting.is_readable() {
         fitting.make_readable();
     }
-    if is_styled {
-        fitting.drawing = asked;
-        let chosen = (&fitting.options, &fitting.page);
-        fitting.best = Attempt::drawn(mission, asked, chosen, &mut Layouts::default());
+    if plain.style != asked.style {
+        fitting.draw_again(asked);
     }
-    let drawing = asked;
+    fitting.drawing = asked;
     let mut composed = fitting.composed();
-    if !drawing.is_sized && drawing.is_fitted && drawing.page.width_mm.is_none() {
-        composed.page = crop::cropped(&composed, drawing);
+    if !asked.is_sized && asked.is_fitted && asked.page.width_mm.is_none() {
+        composed.page = cropped(&composed, asked);
     }
-    if drawing.medium.as_ref().is_some_and(|m| m.paper.is_some()) {
-        composed.page = crop::lowered(&composed, drawing);
+    if asked.medium.as_ref().is_some_and(|m| m.paper.is_some()) {
+        composed.page = lowered(&composed, asked);
     }
     let notices = &mut composed.notices;
-    notices.extend(picture::unshown(&composed.view, &drawing.fonts));
+    notices.extend(picture::unshown(&composed.view, &asked.fonts));
     let remarks = composed.layout.remarks.iter();
     notices.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text.as_str())));
     composed
@@ -102,37 +95,61 @@ impl Fitting<'_> {
         self.best.is_readable(self.drawing)
     }
 
-    fn attempt(&mut self, options: &ViewOptions, page: &PageOptions) -> Attempt {
-        let layouts = &mut self.layouts;
-        Attempt::new(self.mission, self.drawing, (options, page), layouts)
+    fn options(&self) -> &ViewOptions {
+        &self.best.composed.options
     }
 
-    fn again(&mut self) {
-        let chosen = (&self.options, &self.page);
-        self.best = Attempt::new(self.mission, self.drawing, chosen, &mut self.layouts);
+    fn page(&self) -> &PageOptions {
+        &self.best.composed.page
+    }
+
+    fn attempt(&mut self, options: ViewOptions, page: PageOptions) -> Attempt {
+        Attempt::new(self.mission, self.drawing, options, page, &mut self.layouts)
+    }
+
+    /// Takes these options on the page so far.
+    fn show(&mut self, options: ViewOptions) {
+        self.best = self.attempt(options, self.page().clone());
+    }
+
+    /// Takes what is shown so far as another drawing draws it, however small its text is.
+    fn draw_again(&mut self, drawing: &Drawing) {
+        let (options, page) = (self.options().clone(), self.page().clone());
+        self.best = Attempt::laid_out(self.mission, drawing, options, page, &mut self.layouts);
     }
 
     fn make_readable(&mut self) {
-        if !self.drawing.is_sized && self.page.width_mm.is_none() {
-            self.page.size = LARGEST;
-            if self.best.layout.is_some()
-                || !is_crowded(self.best.view.items.len(), self.drawing, &self.page)
-            {
-                self.again();
+        if !self.drawing.is_sized && self.page().width_mm.is_none() {
+            let page = self.page_of(LARGEST);
+            let boxes = self.best.composed.view.items.len();
+            if self.best.is_laid_out || !is_crowded(boxes, self.drawing, &page) {
+                self.best = self.attempt(self.options().clone(), page);
+            } else {
+                self.best.composed.page = page;
             }
         }
-        if !self.is_readable() && !self.options.mode.is_direct() {
-            self.options.mode = Mode::Nodes;
-            self.options.is_bundled = true;
-            self.again();
+        if !self.is_readable() && !self.options().mode.is_direct() {
+            self.show(ViewOptions {
+                mode: Mode::Nodes,
+                is_bundled: true,
+                ..self.options().clone()
+            });
             self.take_higher_page();
         }
-        if !self.is_readable() && self.options.is_still == Some(true) {
-            self.join_alike();
+        if !self.is_readable() && self.options().is_still == Some(true) {
+            // One box for the nodes of a namespace that are there in the same phases.
+            let phases = self.mission.log.phases.iter().map(|phase| phase.span);
+            self.show(ViewOptions {
+                alike_in: phases.collect(),
+                ..self.options().clone()
+            });
+            self.take_higher_page();
         }
         if !self.is_readable() {
-            self.options.are_leaves_in_words = true;
-            self.again();
+            self.show(ViewOptions {
+                are_leaves_in_words: true,
+                ..self.options().clone()
+            });
             self.take_higher_page();
         }
         let spared = self.collapse_the_steady();
@@ -145,38 +162,27 @@ impl Fitting<'_> {
         self.take_lower_page();
     }
 
-    /// One box for the nodes of a namespace that are there in the same phases.
-    fn join_alike(&mut self) {
-        let phases = self.mission.log.phases.iter().map(|phase| phase.span);
-        self.options.alike_in = phases.collect();
-        self.again();
-        self.take_higher_page();
-    }
-
     /// Takes the lowest page of a purpose on which everything is legible, else the one with the largest text.
     fn take_higher_page(&mut self) {
-        let sizes = self.sizes();
-        for size in sizes.into_iter().skip(1) {
+        for size in self.sizes().into_iter().skip(1) {
             if self.is_readable() {
                 return;
             }
-            let page = self.page_of(size);
-            let attempt = self.attempt(&self.options.clone(), &page);
-            if attempt.text > self.best.text || attempt.layout.is_none() {
-                (self.page, self.best) = (page, attempt);
+            let attempt = self.attempt(self.options().clone(), self.page_of(size));
+            if attempt.text > self.best.text || !attempt.is_laid_out {
+                self.best = attempt;
             }
         }
     }
 
     /// Takes the lowest page of a purpose on which the remaining text is legible.
     fn take_lower_page(&mut self) {
-        let sizes = self.sizes();
-        let height = self.page.size.h;
-        for size in sizes.into_iter().take_while(|size| size.h < height) {
-            let page = self.page_of(size);
-            let attempt = self.attempt(&self.options.clone(), &page);
+        let height = self.page().size.h;
+        let lower = self.sizes().into_iter();
+        for size in lower.take_while(|size| size.h < height) {
+            let attempt = self.attempt(self.options().clone(), self.page_of(size));
             if attempt.is_readable(self.drawing) {
-                (self.page, self.best) = (page, attempt);
+                self.best = attempt;
                 return;
             }
         }
@@ -191,7 +197,7 @@ impl Fitting<'_> {
     fn page_of(&self, size: Size) -> PageOptions {
         PageOptions {
             size,
-            ..self.page.clone()
+            ..self.page().clone()
         }
     }
 
@@ -201,31 +207,36 @@ impl Fitting<'_> {
         let reported = self.changing();
         let mut left: Vec<Spared> = Vec::new();
         loop {
+            let mut options = self.options().clone();
+            let view = &self.best.composed.view;
             let is_new = |name: &Arc<str>| {
-                !self.options.collapse.contains(name)
-                    && !left.iter().any(|(other, _)| other == name)
+                !options.collapse.contains(name) && !left.iter().any(|other| other.space == *name)
             };
-            let candidates = self.best.view.collapsible(self.mission, &self.options);
+            let candidates = view.collapsible(self.mission, &options);
             let fresh = candidates.into_iter().filter(|c| is_new(&c.name));
             let fresh: Vec<Collapsible> = fresh.collect();
             if self.is_readable() || fresh.is_empty() {
                 return left;
             }
             let is_hopeless = self.best.text < self.drawing.readable() * HOPELESS;
-            let before = self.options.collapse.len();
-            for candidate in self.at_once(fresh) {
-                let mut changing = self.best.view.holding(&reported, &candidate.name);
-                changing.retain(|name| !is_hopeless && !self.options.expand.contains(name));
-                if changing.is_empty() || candidate.items >= changing.len() + FEWEST_STEADY {
-                    self.options.collapse.push(Arc::clone(&candidate.name));
-                    self.options.expand.extend(changing.iter().cloned());
+            let before = options.collapse.len();
+            let many = self.at_once(fresh.len());
+            for candidate in fresh.into_iter().take(many) {
+                let mut outside = view.holding(&reported, &candidate.name);
+                outside.retain(|name| !is_hopeless && !options.expand.contains(name));
+                if outside.is_empty() || candidate.items >= outside.len() + FEWEST_STEADY {
+                    options.collapse.push(Arc::clone(&candidate.name));
+                    options.expand.extend(outside.iter().cloned());
                 }
-                if !changing.is_empty() {
-                    left.push((candidate.name, changing));
+                if !outside.is_empty() {
+                    left.push(Spared {
+                        space: candidate.name,
+                        outside,
+                    });
                 }
             }
-            if self.options.collapse.len() > before {
-                self.again();
+            if options.collapse.len() > before {
+                self.show(options);
             }
         }
     }
@@ -233,7 +244,7 @@ impl Fitting<'_> {
     /// The changing elements, the nodes that they connect, and the neighbours of those.
     fn changing(&self) -> BTreeSet<Element> {
         let elements = &self.mission.elements;
-        let view = &self.best.view;
+        let view = &self.best.composed.view;
         let mut reported: BTreeSet<Element> = headlines(self.mission).collect();
         let topics: BTreeSet<_> = reported
             .iter()
@@ -263,30 +274,28 @@ impl Fitting<'_> {
     /// Collapses these namespaces including the boxes left outside, until the text is legible.
     fn collapse_the_rest(&mut self, mut left: Vec<Spared>) {
         while !self.is_readable() && !left.is_empty() {
-            let now = self.at_once(left.clone());
-            left.drain(..now.len());
-            for (name, changing) in now {
-                self.options.expand.retain(|kept| !changing.contains(kept));
-                if !self.options.collapse.contains(&name) {
-                    self.options.collapse.push(name);
+            let mut options = self.options().clone();
+            for Spared { space, outside } in left.drain(..self.at_once(left.len())) {
+                options.expand.retain(|kept| !outside.contains(kept));
+                if !options.collapse.contains(&space) {
+                    options.collapse.push(space);
                 }
             }
-            self.again();
+            self.show(options);
         }
     }
 
-    /// The first of these; two if the text is too small for one to suffice, or a quarter if it is far too small, which
-    /// saves a layout per namespace.
-    fn at_once<T>(&self, mut all: Vec<T>) -> Vec<T> {
+    /// How many of so many namespaces are collapsed at once: one; two if the text is too small for one to suffice, or a
+    /// quarter if it is far too small, which saves a layout per namespace.
+    fn at_once(&self, many: usize) -> usize {
         let share = self.best.text / self.drawing.readable();
-        all.truncate(if share < FAR {
-            all.len().div_ceil(4)
+        many.min(if share < FAR {
+            many.div_ceil(4)
         } else if share < SMALL {
             2
         } else {
             1
-        });
-        all
+        })
     }
 
     /// The last resort: one box per outermost namespace, and one line for all topics between two boxes, if more
@@ -301,60 +310,57 @@ impl Fitting<'_> {
         let outermost: BTreeSet<&str> = nodes.filter_map(|n| outermost(n.name.as_str())).collect();
         let is_open = |space: &&str| bundled.expand.iter().any(|open| &**open == *space);
         let outermost: Vec<&str> = outermost.into_iter().filter(|s| !is_open(s)).collect();
-        let outermost = outermost.into_iter().map(Arc::from);
-        bundled.collapse.extend(outermost);
-        let attempt = self.attempt(&bundled, &self.page.clone());
-        if attempt.text > self.best.text && outline(self.mission, &bundled).items.len() > 1 {
-            (self.options, self.best) = (bundled, attempt);
+        bundled
+            .collapse
+            .extend(outermost.into_iter().map(Arc::from));
+        let attempt = self.attempt(bundled, self.page().clone());
+        if attempt.text > self.best.text && attempt.composed.view.items.len() > 1 {
+            self.best = attempt;
         }
     }
 
-    /// Reopens namespaces that need not be collapsed, the outermost first.
+    /// Reopens namespaces that need not be collapsed, the outermost first: of a fleet, the namespaces inside a robot are
+    /// collapsed before the robots, whose boxes then leave room for some of them.
     fn open_again(&mut self) {
         let asked = self.drawing.view.collapse.len();
-        let collapsed = self.options.collapse[asked..].to_vec();
+        let collapsed = self.options().collapse[asked..].to_vec();
         for name in collapsed.iter().rev().take(MOST_REOPENED) {
-            let mut opened = self.options.clone();
+            let mut opened = self.options().clone();
             opened.collapse.retain(|n| n != name);
-            let attempt = self.attempt(&opened, &self.page.clone());
+            let attempt = self.attempt(opened, self.page().clone());
             if attempt.is_readable(self.drawing) {
-                (self.options, self.best) = (opened, attempt);
+                self.best = attempt;
             }
         }
     }
 
     /// The drawing with notices about what was done to make it legible, and whether that was sufficient.
     fn composed(mut self) -> Composed {
-        if self.drawing.is_fitted && !self.is_readable() {
+        let drawing = self.drawing;
+        if drawing.is_fitted && !self.is_readable() {
             // No effort has been made to improve an illegible drawing.
-            let drawing = Drawing {
+            self.draw_again(&Drawing {
                 is_fitted: false,
-                ..self.drawing.clone()
-            };
-            let chosen = (&self.options, &self.page);
-            self.best = Attempt::drawn(self.mission, &drawing, chosen, &mut Layouts::default());
+                ..drawing.clone()
+            });
         }
-        let (drawing, text) = (self.drawing, self.best.text);
-        let mut notices = self.best.notices;
+        let (mut composed, text) = (self.best.composed, self.best.text);
         if drawing.is_fitted || drawing.medium.is_some() {
-            let collapsed = &self.options.collapse[drawing.view.collapse.len()..];
-            let kept = &self.options.expand[drawing.view.expand.len()..];
-            notices.extend(reported(drawing, &parts(collapsed, kept), &self.page, text).iter());
-            if self.options.is_bundled != drawing.view.is_bundled {
+            let collapsed = &composed.options.collapse[drawing.view.collapse.len()..];
+            let kept = &composed.options.expand[drawing.view.expand.len()..];
+            let parts = parts(collapsed, kept);
+            let reported = reported(drawing, &parts, &composed.page, text);
+            composed.notices.extend(reported.iter());
+            if composed.options.is_bundled != drawing.view.is_bundled {
                 let text = format!(
                     "drew one line per pair of boxes{}; draw each topic with `--fit none`",
                     so_that(text >= drawing.readable())
                 );
-                notices.add(Notice::new(NoticeKind::Hidden, text));
+                let notice = Notice::new(NoticeKind::Hidden, text);
+                composed.notices.add(notice);
             }
         }
-        Composed {
-            view: self.best.view,
-            options: self.options,
-            page: self.page,
-            layout: self.best.layout.unwrap_or_default(),
-            notices,
-        }
+        composed
     }
 }
 
@@ -369,25 +375,24 @@ fn outermost(name: &str) -> Option<&str> {
 struct Layouts(Vec<(Plan, LayoutOptions, Layout)>);
 
 impl Layouts {
-    fn of(&mut self, plan: &Plan, page: &LayoutOptions, engine: &dyn Engine) -> Layout {
+    /// The layout of a plan, made unless there is one.
+    fn of(&mut self, plan: &Plan, page: &LayoutOptions, make: impl FnOnce() -> Layout) -> Layout {
         let is_same = |made: &&(Plan, LayoutOptions, Layout)| made.1 == *page && made.0 == *plan;
         if let Some((_, _, layout)) = self.0.iter().find(is_same) {
             return layout.clone();
         }
-        let layout = lay_out(plan, page, engine);
+        let layout = make();
         self.0.push((plan.clone(), *page, layout.clone()));
         layout
     }
 }
 
-/// A layout of the view with some options.
+/// What some options show on a page.
 struct Attempt {
-    /// The view; without its windows if there is no layout.
-    view: View,
-    notices: Notices,
-    /// The layout; `None` if there are too many boxes for any legible layout.
-    layout: Option<Layout>,
-    /// The size of its smallest text in pixels.
+    composed: Composed,
+    /// Whether it is laid out; not if there are too many boxes for any legible layout.
+    is_laid_out: bool,
+    /// The size of its smallest text in pixels; 0 without a layout.
     text: f64,
 }
 
@@ -396,35 +401,36 @@ impl Attempt {
     fn new(
         mission: &Mission,
         drawing: &Drawing,
-        (options, page): (&ViewOptions, &PageOptions),
+        options: ViewOptions,
+        page: PageOptions,
         layouts: &mut Layouts,
     ) -> Self {
         let elements = &mission.elements;
         let boxes = elements.nodes.len() + elements.topics.len();
-        if drawing.is_fitted && is_crowded(boxes, drawing, page) {
-            let view = outline(mission, options);
-            if is_crowded(view.items.len(), drawing, page) {
+        if drawing.is_fitted && is_crowded(boxes, drawing, &page) {
+            let composed = Composed::outline(mission, options.clone(), page.clone());
+            if is_crowded(composed.view.items.len(), drawing, &page) {
                 return Self {
-                    view,
-                    notices: Notices::new(),
-                    layout: None,
+                    composed,
+                    is_laid_out: false,
                     text: 0.0,
                 };
             }
         }
-        Self::drawn(mission, drawing, (options, page), layouts)
+        Self::laid_out(mission, drawing, options, page, layouts)
     }
 
     /// An attempt with a layout in any case.
-    fn drawn(
+    fn laid_out(
         mission: &Mission,
         drawing: &Drawing,
-        (options, page): (&ViewOptions, &PageOptions),
+        options: ViewOptions,
+        page: PageOptions,
         layouts: &mut Layouts,
     ) -> Self {
         // The widest labels depend on rates, so the windows are needed too.
-        let (view, notices) = view(mission, options);
-        let measured = Measured::new(&view, &drawing.style, &drawing.fonts, page.clone());
+        let mut composed = Composed::new(mission, options, page);
+        let measured = composed.measured(drawing);
         let readable = drawing.readable();
         let plan = measured.plan();
         let least = readable / measured.smallest_text();
@@ -437,10 +443,8 @@ impl Attempt {
             ..measured.layout_options()
         };
         let mut placed = |page: &LayoutOptions| {
-            let layout = match &drawing.kept {
-                None => layouts.of(plan, page, drawing.engine),
-                Some(kept) => extend(plan, page, drawing.engine, &known(&view, kept)),
-            };
+            let make = || drawing.laid_out(plan, page, Some(&composed.view));
+            let layout = layouts.of(plan, page, make);
             (measured.text_px(&layout), layout)
         };
         let (mut text, mut layout) = placed(&page);
@@ -454,10 +458,10 @@ impl Attempt {
                 (text, layout) = tight;
             }
         }
+        composed.layout = layout;
         Self {
-            view,
-            notices,
-            layout: Some(layout),
+            composed,
+            is_laid_out: true,
             text,
         }
     }
@@ -478,4 +482,129 @@ const LEAST_BOX: f64 = 4.0;
 fn is_crowded(boxes: usize, drawing: &Drawing, page: &PageOptions) -> bool {
     let text = drawing.readable();
     boxes as f64 > page.size.w * page.size.h / (LEAST_BOX * text * text)
+}
+
+/// The size of names on a page cropped to its graph, in pixels.
+const NAMES_PX: f64 = 15.0;
+/// The space around the graph on such a page, in pixels.
+const AROUND: f64 = 20.0;
+/// The minimum width of such a page for an animation, which has a timeline, and for a still; and the minimum height.
+const LEAST: (f64, f64, f64) = (720.0, 320.0, 140.0);
+/// The minimum width of such a page with a legend.
+const LEGEND: f64 = 480.0;
+/// The width of a page with decorations (title, legend, timeline) of normal size, and their smallest legible scale.
+const DECORATIONS: (f64, f64) = (1100.0, 0.8);
+
+/// The page of a medium as high as its graph: paper is no wider or narrower, but need not stay empty.
+fn lowered(composed: &Composed, drawing: &Drawing) -> PageOptions {
+    let page = &composed.page;
+    let measured = composed.measured(drawing);
+    let graph = composed.layout.size.h * measured.scale(&composed.layout);
+    let high = page.size.h - measured.layout_options().page.h + graph;
+    PageOptions {
+        size: Size::new(page.size.w, libm::ceil(high).min(page.size.h)),
+        ..page.clone()
+    }
+}
+
+/// The page cropped to its graph, if names of a legible size leave it empty.
+fn cropped(composed: &Composed, drawing: &Drawing) -> PageOptions {
+    let (view, page, natural) = (&composed.view, &composed.page, composed.layout.size);
+    let largest = NAMES_PX / drawing.style.node.size;
+    let scale = composed
+        .measured(drawing)
+        .scale(&composed.layout)
+        .min(largest);
+    let least = if view.has_time() { LEAST.0 } else { LEAST.1 };
+    let wide = (natural.w * scale + 2.0 * AROUND)
+        .max(least)
+        .min(page.size.w);
+    let mut cropped = PageOptions {
+        size: Size::new(wide, page.size.h),
+        unit: Some((wide / DECORATIONS.0).clamp(DECORATIONS.1, 1.0)),
+        has_legend: page.has_legend && wide >= LEGEND,
+        ..page.clone()
+    };
+    let decorations = page.size.h
+        - drawing
+            .measured(view, cropped.clone())
+            .layout_options()
+            .page
+            .h;
+    let high = decorations + natural.h * scale + 1.2 * AROUND;
+    cropped.size = Size::new(libm::ceil(wide), libm::ceil(high.max(LEAST.2)));
+    if cropped.size.h < page.size.h {
+        cropped
+    } else {
+        page.clone()
+    }
+}
+
+/// The collapsed namespaces as text, each with the number of changing elements kept outside.
+fn parts(collapsed: &[Arc<str>], kept: &[Arc<str>]) -> Vec<(Arc<str>, String)> {
+    let reported = |name: &Arc<str>| {
+        let inside = |other: &&Arc<str>| lies_in(other, name);
+        let words = match kept.iter().filter(inside).count() {
+            0 => name.to_string(),
+            many => format!("{name} except {} in it", words::count(many, "node")),
+        };
+        (Arc::clone(name), words)
+    };
+    collapsed.iter().map(reported).collect()
+}
+
+/// The notices about what `--fit auto` did, and whether it was sufficient: the smallest text is `text` pixels high.
+fn reported(
+    drawing: &Drawing,
+    collapsed: &[(Arc<str>, String)],
+    got: &PageOptions,
+    text: f64,
+) -> Notices {
+    let mut notices = Notices::new();
+    let is_readable = text >= drawing.readable();
+    if drawing.page.size != got.size && drawing.medium.is_none() {
+        let text = format!(
+            "the page is {}x{}{} (change with `--size`)",
+            got.size.w,
+            got.size.h,
+            so_that(is_readable)
+        );
+        notices.add(Notice::new(NoticeKind::Chosen, text));
+    }
+    if let Some((first, _)) = collapsed.first() {
+        let collapsed: Vec<&String> = collapsed.iter().map(|(_, words)| words).collect();
+        let text = format!(
+            "drew namespaces as one box each{}: {}; keep one open with `--collapse -{first}`, all with `--fit none`",
+            so_that(is_readable),
+            words::some_of(&collapsed, 3)
+        );
+        notices.add(Notice::new(NoticeKind::Hidden, text));
+    }
+    if let Some(medium) = drawing.medium.as_ref().filter(|_| !is_readable) {
+        let size = match got.width_mm {
+            Some(mm) => {
+                let pt = text * mm / got.size.w * 72.0 / 25.4;
+                format!("{} pt", words::number(words::significant(pt, 2)))
+            }
+            None => format!("{} pixels", words::number(words::significant(text, 2))),
+        };
+        let advice = medium.advice();
+        let text = format!("the smallest text will be {size}, too small to read; {advice}");
+        notices.add(Notice::new(NoticeKind::Note, text));
+    } else if !is_readable {
+        let text = format!(
+            "the smallest text is {} pixels high, too small to read; use `--ns-filter`, `--hide dead,leaf`, `--mode nodes` or a larger `--size`",
+            words::number(text)
+        );
+        notices.add(Notice::new(NoticeKind::Note, text));
+    }
+    notices
+}
+
+fn so_that(is_readable: bool) -> &'static str {
+    if is_readable {
+        " to keep labels legible"
+    } else {
+        ""
+    }
 }

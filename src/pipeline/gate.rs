@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
-use std::io::Write as _;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::{Body, Drawing, Reading, Render, Watch, read, show};
@@ -11,22 +11,22 @@ use crate::base::error::{Error, Result};
 use crate::base::time::Period;
 use crate::base::{budget, file, words};
 use crate::export::Output;
-use crate::export::check as places;
-use crate::export::sink::OutputSink;
+use crate::export::check::{check as check_targets, make_folder};
+use crate::export::sink::write_file;
 use crate::export::target::Target;
 use crate::gate::{
-    CheckFormat, DiffFormat, DiffSubject, Difference, Expectation, Runs, Side, Subject, Verdict,
-    differences, judge, pairs, union, update, write,
+    DiffSubject, Difference, Expectation, ReportFormat, Runs, Side, Subject, Verdict, differences,
+    judge, pairs, union, update, write,
 };
 use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::Length;
 use crate::mission::Mission;
 
-/// One report of a check, to write to a file.
+/// One report of a check or a comparison, to write to a file.
 #[derive(Clone, Debug)]
 pub struct Report {
     pub(crate) target: Target,
-    pub(crate) format: &'static CheckFormat,
+    pub(crate) format: &'static ReportFormat,
 }
 
 impl Report {
@@ -39,7 +39,7 @@ impl Report {
         let text = output.to_string_lossy();
         let named = text.split_once(':');
         if let Some((format, path)) =
-            named.and_then(|(word, path)| Some((CheckFormat::from_word(word)?, path)))
+            named.and_then(|(word, path)| Some((ReportFormat::from_word(word)?, path)))
         {
             return Ok(Self {
                 target: Target::parse(path),
@@ -54,7 +54,7 @@ impl Report {
         };
         Ok(Self {
             target: Target::parse(output),
-            format: CheckFormat::of_name(&text).ok_or_else(unknown)?,
+            format: ReportFormat::of_name(&text, |_| true).ok_or_else(unknown)?,
         })
     }
 }
@@ -105,14 +105,14 @@ impl Check {
     }
 
     /// The findings of this check as a report.
-    pub fn report(&self, done: &Checked, format: &CheckFormat) -> String {
+    pub fn report(&self, done: &Checked, format: &ReportFormat) -> String {
         let subject = Subject {
             mission: &done.mission,
             bags: self.bags.clone(),
             file: plain(&self.expect),
             tracked: self.tracked.clone(),
         };
-        (format.write)(&subject, &done.verdict)
+        (format.verdict)(&subject, &done.verdict)
     }
 }
 
@@ -150,7 +150,7 @@ pub fn check(job: &Check, watch: &mut dyn Watch) -> Result<Checked> {
     let targets: Vec<Target> = job.reports.iter().map(|r| r.target.clone()).collect();
     let mut kept = job.reading.files();
     kept.push(job.expect.clone());
-    places::check(&targets, &kept)?;
+    check_targets(&targets, &kept)?;
     let reading = in_windows(&job.reading, expectation.period);
     let mission = read(&reading, watch)?;
     let mut verdict = judge(&expectation, &mission, is_part(&reading));
@@ -180,7 +180,8 @@ pub struct Diff {
     pub pictures: Vec<Output>,
     /// The options of these pictures.
     pub drawing: Drawing,
-    pub(crate) reports: Vec<(Target, &'static DiffFormat)>,
+    /// The files to write, in formats of differences.
+    pub(crate) reports: Vec<Report>,
 }
 
 impl Diff {
@@ -207,8 +208,9 @@ impl Diff {
     /// [`Error::Usage`] for an unknown extension, and for tables, which contain times, which differ between the two.
     pub fn write(&mut self, output: &OsStr) -> Result<()> {
         let name = output.to_string_lossy();
-        if let Some(format) = DiffFormat::of_name(&name) {
-            self.reports.push((Target::parse(output), format));
+        if let Some(format) = ReportFormat::of_name(&name, |f| f.differences.is_some()) {
+            let target = Target::parse(output);
+            self.reports.push(Report { target, format });
             return Ok(());
         }
         let picture = Output::named(output, None)?;
@@ -222,9 +224,10 @@ impl Diff {
         Ok(())
     }
 
-    /// The differences as a report.
-    pub fn report(&self, done: &Compared, format: &DiffFormat) -> String {
-        (format.write)(&self.subject, &done.differences)
+    /// The differences as a report; empty in a format of verdicts alone.
+    pub fn report(&self, differences: &[Difference], format: &ReportFormat) -> String {
+        let write = format.differences;
+        write.map_or_else(String::new, |write| write(&self.subject, differences))
     }
 }
 
@@ -262,16 +265,16 @@ pub struct Compared {
 /// # Errors
 /// If a mission cannot be read or an output cannot be written.
 pub fn diff(job: &Diff, watch: &mut dyn Watch) -> Result<Compared> {
-    let reports = job.reports.iter().map(|(target, _)| target.clone());
+    let reports = job.reports.iter().map(|report| report.target.clone());
     let pictures = job.pictures.iter().map(|output| output.target.clone());
     let targets: Vec<Target> = reports.chain(pictures).collect();
-    places::check(&targets, &files(&job.readings))?;
+    check_targets(&targets, &files(&job.readings))?;
     let [first, second] = &job.readings;
     let first = read(first, watch)?;
     let second = read(second, watch)?;
     let differences = differences(&first, &second, job.rate_change);
-    for (target, format) in &job.reports {
-        put(target, &(format.write)(&job.subject, &differences))?;
+    for report in &job.reports {
+        put(&report.target, &job.report(&differences, report.format))?;
     }
     // Animations show the first mission and then both; stills show both.
     let (moving, standing): (Vec<Output>, Vec<Output>) = job
@@ -368,7 +371,7 @@ pub fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<BaselineWritten
         Some((path, _)) => Target::Path((*path).to_owned()),
         None => job.output.clone(),
     };
-    places::check(std::slice::from_ref(&target), &kept)?;
+    check_targets(std::slice::from_ref(&target), &kept)?;
     let mut period = old.as_ref().and_then(|(_, (_, old))| old.period);
     let mut missions: Vec<Mission> = Vec::new();
     for run in &job.runs {
@@ -412,13 +415,10 @@ fn files(readings: &[Reading]) -> Vec<PathBuf> {
 
 /// Writes a text atomically.
 fn put(target: &Target, text: &str) -> Result<()> {
-    places::make_folder(target)?;
-    let mut sink = OutputSink::create(target, None)?;
-    let failed = sink.error();
-    match sink.write_all(text.as_bytes()) {
-        Ok(()) => sink.commit().map(drop),
+    make_folder(target)?;
+    match write_file(target, text.as_bytes()) {
         // A closed pipe is not an error.
-        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-        Err(error) => Err(failed(error)),
+        Err(Error::Io { source, .. }) if source.kind() == ErrorKind::BrokenPipe => Ok(()),
+        written => written.map(drop),
     }
 }

@@ -99,12 +99,6 @@ impl Reading {
         let there = named.filter(|path| path.exists()).cloned();
         files(&self.inputs).into_iter().chain(there).collect()
     }
-
-    /// The same reading with phases from another source.
-    #[must_use]
-    pub fn with_phases(self, phases: Phases) -> Self {
-        Self { phases, ..self }
-    }
 }
 
 /// The existing files and folders among inputs.

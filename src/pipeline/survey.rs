@@ -6,7 +6,7 @@ use std::path::Path;
 use super::collect::NOTHING_RECORDED;
 use super::{Reading, Watch, read};
 use crate::bag::{self, Input, Recording};
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Fault, Result};
 use crate::export::tables::{TableFormat, writer};
 use crate::mission::Mission;
 use crate::mission::info::{SurveyRow, survey_table};
@@ -102,9 +102,9 @@ pub(crate) fn each<'a>(
 
 fn unread(error: Error) -> Unread {
     match error {
-        Error::NoMessages { path, hint } => Unread {
+        Error::NoMessages(Fault { what, hint }) => Unread {
             is_loss: hint != NOTHING_RECORDED,
-            why: format!("`{}` contains no messages: {hint}", path.display()),
+            why: format!("{what}: {hint}"),
         },
         error => Unread {
             is_loss: true,
@@ -133,11 +133,8 @@ pub(super) fn recordings(folder: &Path) -> Result<Vec<Recording>> {
 
 /// The error of a folder without bags.
 pub(super) fn no_bags(folder: &Path) -> Error {
-    Error::UnknownBag {
-        path: folder.to_owned(),
-        looks_like: "a folder without bags".to_owned(),
-        hint: "give a bag, a rosbag2 folder, or a folder with bags below it".to_owned(),
-    }
+    let hint = "give a bag, a rosbag2 folder, or a folder with bags below it";
+    Error::unknown_bag(folder, "a folder without bags", hint)
 }
 
 #[cfg(test)]

@@ -37,7 +37,9 @@ fn main() {
     let (view, _) = view(&mission, &ViewOptions::default());
     let (style, fonts) = (Style::builtin("light").unwrap(), Fonts::bundled());
     let measured = Measured::new(&view, &style, &fonts, PageOptions::default());
-    let picture = measured.laid_out(layout::engine("layered").unwrap());
+    let engine = layout::engine("layered").unwrap();
+    let layout = layout::lay_out(measured.plan(), &measured.layout_options(), engine);
+    let picture = measured.with(layout);
     let painter = Painter::new(&fonts);
     println!(
         "{} boxes, {} arrows, {} windows",

@@ -51,7 +51,9 @@ fn main() {
         ..picture::PageOptions::default()
     };
     let measured = picture::Measured::new(&view, &style, &fonts, options);
-    let picture = measured.laid_out(layout::engine("layered").unwrap());
+    let engine = layout::engine("layered").unwrap();
+    let layout = layout::lay_out(measured.plan(), &measured.layout_options(), engine);
+    let picture = measured.with(layout);
     let painter = Painter::new(&fonts);
     let variable = |name: &str| std::env::var(name).ok();
     let number = |name: &str| variable(name).and_then(|v| v.parse::<u32>().ok());
@@ -63,7 +65,7 @@ fn main() {
         picture: &picture,
         style: &style,
         fonts: &fonts,
-        engine: layout::engine("layered").unwrap(),
+        others: &[],
     };
     let width = mm.map_or(StripWidth::AtLeast(1280.0), StripWidth::Paper);
     let page = strip(source, &choice.clone().unwrap_or(Choice::Changes), width).unwrap();

@@ -18,8 +18,13 @@ fn with_picture<T>(
 ) -> T {
     let (view, _) = view(&mission(windows), &ViewOptions::default());
     let (style, fonts) = (Style::builtin(style).unwrap(), Fonts::bundled());
+    then(&laid_out(Measured::new(&view, &style, &fonts, options)))
+}
+
+fn laid_out(measured: Measured<'_>) -> Picture<'_> {
     let engine = layout::engine("layered").unwrap();
-    then(&Measured::new(&view, &style, &fonts, options).laid_out(engine))
+    let layout = layout::lay_out(measured.plan(), &measured.layout_options(), engine);
+    measured.with(layout)
 }
 
 fn scenes(windows: &[&str]) -> Vec<Scene> {
@@ -324,9 +329,7 @@ fn bundles(windows: &[&str]) -> Vec<Vec<String>> {
     };
     let (view, _) = view(&mission(windows), &options);
     let (style, fonts) = (Style::builtin("light").unwrap(), Fonts::bundled());
-    let engine = layout::engine("layered").unwrap();
-    let measured = Measured::new(&view, &style, &fonts, PageOptions::default());
-    let picture = measured.laid_out(engine);
+    let picture = laid_out(Measured::new(&view, &style, &fonts, PageOptions::default()));
     let texts = |group: &Group| {
         let texts = group.pieces.iter().filter_map(|piece| match piece {
             Piece::Text(text) => Some(text.text.clone()),

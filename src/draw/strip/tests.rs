@@ -76,14 +76,16 @@ fn strip_of(choice: &str, width_mm: Option<f64>) -> Strip {
     let (mission, view) = two_nodes();
     let (style, fonts) = (Style::builtin("paper").unwrap(), Fonts::bundled());
     let measured = Measured::new(&view, &style, &fonts, PageOptions::default());
-    let picture = measured.laid_out(layout::engine("layered").unwrap());
+    let engine = layout::engine("layered").unwrap();
+    let layout = layout::lay_out(measured.plan(), &measured.layout_options(), engine);
+    let picture = measured.with(layout);
     let source = StripSource {
         mission: &mission,
         view: &view,
         picture: &picture,
         style: &style,
         fonts: &fonts,
-        engine: layout::engine("layered").unwrap(),
+        others: &[],
     };
     let width = width_mm.map_or(StripWidth::About(1280.0), StripWidth::Paper);
     strip(source, &Choice::parse(choice).unwrap(), width).unwrap()

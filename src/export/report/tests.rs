@@ -27,7 +27,7 @@ fn only_what_changed_and_its_neighbours_are_drawn() {
         &mission(&["/a>/t@2 /x>/y@1", "/a>/t@2 /b</t /x>/y@1"]),
         &ViewOptions::default(),
     );
-    let (seen, left_out) = graph::changed(&view).unwrap();
+    let (seen, left_out) = chart::changed(&view).unwrap();
     let mut names: Vec<&str> = seen
         .items
         .iter()
@@ -43,7 +43,7 @@ fn only_what_changed_and_its_neighbours_are_drawn() {
 #[test]
 fn long_tables_state_what_is_left_out() {
     let rows = (0..100).map(|n| format!("| {n} |\n"));
-    let text = tables::table(&["N"], rows, 60).unwrap();
+    let text = table(&["N"], rows.collect(), 60).unwrap();
     assert!(
         text.len() < 120 && text.ends_with("rows more left out.\n"),
         "{text}"

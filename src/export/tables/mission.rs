@@ -1,10 +1,9 @@
 //! The tables of a mission: their columns, each with its cell, and their rows.
 
-use super::seen::{Seen, each};
 use crate::base::table::{Batch, ColumnKind, ColumnOf, TableCell, columns};
 use crate::base::time::{Span, Stamp};
 use crate::graph::diff::Change;
-use crate::graph::{Element, Node, NodeId, Topic};
+use crate::graph::{Element, ElementState, Id as _, Node, NodeId, NodeLoad, Topic};
 use crate::mission::Mission;
 use crate::mission::event_log::{Detail, Event, EventId, described};
 
@@ -131,15 +130,50 @@ element_columns! {
     LAST "last_ns" Time |all, one| time(all.elements.seen(one.state.what).last);
 }
 
+/// The elements of a kind in each window.
 fn elements(
     all: &Mission,
     is_kind: fn(&Element) -> bool,
     columns: &[Column<Seen>],
     row: RowTaker<'_>,
 ) {
-    each(all, is_kind, &mut |one| {
-        put(all, columns, one, row);
-    });
+    let skews = all.skews();
+    for (window, graph) in all.each() {
+        // Of nodes, which come first.
+        let has_loads = is_kind(&Element::Node(NodeId::of(0)));
+        let loads = has_loads.then(|| graph.loads(&all.elements));
+        let mut loads = loads.into_iter().flatten();
+        for state in graph.states {
+            let load = loads.next();
+            if !is_kind(&state.what) {
+                continue;
+            }
+            let skew = match state.what {
+                Element::Topic(id) => skews.get(id).copied().flatten(),
+                _ => None,
+            };
+            let (win, span) = (window.index, window.span);
+            let one = Seen {
+                win,
+                span,
+                state,
+                skew,
+                load,
+            };
+            put(all, columns, &one, row);
+        }
+    }
+}
+
+/// An element in a window.
+struct Seen {
+    /// The index of the window.
+    win: usize,
+    span: Span,
+    state: ElementState,
+    /// The skew of a topic over all windows.
+    skew: Option<f64>,
+    load: Option<NodeLoad>,
 }
 
 fn node_of<'a>(mission: &'a Mission, one: &Seen) -> Option<&'a Node> {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::base::csv;
 use crate::base::error::{Error, Result};
-use crate::base::table::Batch;
+use crate::base::table::{Batch, TableWriter};
 use crate::base::words::worded;
 #[cfg(feature = "parquet")]
 use crate::export::parquet;
@@ -46,78 +46,26 @@ const NO_PARQUET: &str = "this build of bagreel does not write Parquet";
 /// [`Error::Io`] if the format cannot represent it.
 pub(crate) fn whole(format: TableFormat, table: &Batch) -> Result<Vec<u8>> {
     let write = || {
-        let mut writer = Writer::new(format, Vec::new(), table, &[])?;
+        let mut writer = begin(format, Vec::new(), table, &[])?;
         writer.write(table)?;
         writer.finish()
     };
     write().map_err(Error::io("write", Path::new("-")))
 }
 
-/// A table in progress.
-pub(crate) enum Writer<W: Write + Send> {
-    Csv(Box<csv::CsvRows<W>>),
-    #[cfg(feature = "parquet")]
-    Parquet(Box<parquet::Rows<W>>),
-}
-
-impl<W: Write + Send> Writer<W> {
-    /// Begins a table with the columns of `batch`; `facts` about it are stored if the format supports it.
-    pub(crate) fn new(
-        format: TableFormat,
-        to: W,
-        batch: &Batch,
-        facts: &[(&str, &str)],
-    ) -> io::Result<Self> {
-        let _ = facts;
-        match format {
-            TableFormat::Csv => Ok(Self::Csv(Box::new(csv::CsvRows::new(to, batch)?))),
-            #[cfg(feature = "parquet")]
-            TableFormat::Parquet => {
-                let rows = parquet::Rows::new(to, batch, facts)?;
-                Ok(Self::Parquet(Box::new(rows)))
-            }
-            #[cfg(not(feature = "parquet"))]
-            TableFormat::Parquet => Err(io::Error::other(NO_PARQUET)),
-        }
-    }
-
-    /// Writes all rows of `batch`, which must have the table's columns.
-    pub(crate) fn write(&mut self, batch: &Batch) -> io::Result<()> {
-        match self {
-            Self::Csv(rows) => rows.write(batch),
-            #[cfg(feature = "parquet")]
-            Self::Parquet(rows) => rows.write(batch),
-        }
-    }
-
-    /// The number of bytes of encoded rows in memory.
-    pub(crate) fn held(&self) -> usize {
-        match self {
-            Self::Csv(_) => 0,
-            #[cfg(feature = "parquet")]
-            Self::Parquet(rows) => rows.held(),
-        }
-    }
-
-    /// Writes the rows in memory.
-    #[cfg_attr(
-        not(feature = "parquet"),
-        expect(clippy::unnecessary_wraps, reason = "nothing in a CSV table can fail")
-    )]
-    pub(crate) fn unload(&mut self) -> io::Result<()> {
-        match self {
-            Self::Csv(_) => Ok(()),
-            #[cfg(feature = "parquet")]
-            Self::Parquet(rows) => rows.unload(),
-        }
-    }
-
-    /// Ends the table and returns the sink that it was written to.
-    pub(crate) fn finish(self) -> io::Result<W> {
-        match self {
-            Self::Csv(rows) => rows.finish(),
-            #[cfg(feature = "parquet")]
-            Self::Parquet(rows) => rows.finish(),
-        }
-    }
+/// Begins a table with the columns of `batch`; `facts` about it are stored if the format supports it.
+pub(crate) fn begin<'a, W: Write + Send + 'a>(
+    format: TableFormat,
+    to: W,
+    batch: &Batch,
+    facts: &[(&str, &str)],
+) -> io::Result<Box<dyn TableWriter<W> + 'a>> {
+    let _ = facts;
+    Ok(match format {
+        TableFormat::Csv => Box::new(csv::CsvRows::new(to, batch)?),
+        #[cfg(feature = "parquet")]
+        TableFormat::Parquet => Box::new(parquet::Rows::new(to, batch, facts)?),
+        #[cfg(not(feature = "parquet"))]
+        TableFormat::Parquet => return Err(io::Error::other(NO_PARQUET)),
+    })
 }

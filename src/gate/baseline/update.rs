@@ -111,13 +111,9 @@ fn known(name: &str, expectation: &Expectation, draft: &Draft) -> Result<()> {
 }
 
 fn unchanged(path: &Path, bad: &BadYaml) -> Error {
-    Error::BadFile {
-        path: path.to_owned(),
-        line: bad.at.line,
-        column: bad.at.column,
-        reason: format!("this cannot be changed in place: {}", bad.reason),
-        hint: "write the element as `/name: {key: value}` on one line".to_owned(),
-    }
+    let reason = format!("this cannot be changed in place: {}", bad.reason);
+    let hint = "write the element as `/name: {key: value}` on one line";
+    Error::bad_place(path, [bad.at.line, bad.at.column], &reason, hint)
 }
 
 /// The findings of these runs.

@@ -36,91 +36,89 @@ const SECOND: i64 = 1_000_000_000;
 /// The time of all events of the picture, without meaning.
 const AT: Stamp = Stamp(SECOND);
 
-/// The elements of one mission, by role and topic.
-#[derive(Default)]
-struct MissionSide {
-    nodes: BTreeMap<String, Seen>,
-    topics: BTreeMap<String, TopicSeen>,
-    publishes: BTreeMap<EdgeNames, Seen>,
-    subscribes: BTreeMap<EdgeNames, Seen>,
+/// An element of both missions: a node by its role, a topic, or an edge by both its ends in its direction.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Key {
+    Node(String),
+    Topic(String),
+    Publish(String, String),
+    Subscribe(String, String),
 }
 
-/// What is known of a node or an edge.
-#[derive(Clone, Copy)]
-struct Seen {
+/// What is known of it in one mission.
+#[derive(Clone, Default)]
+struct Known {
     confidence: Confidence,
     evidence: Evidence,
+    /// Of a topic.
+    types: BTreeSet<String>,
+    count: Option<u64>,
+    hz: Option<f64>,
 }
 
-impl From<Peer> for Seen {
+impl From<Peer> for Known {
     fn from(peer: Peer) -> Self {
         Self {
             confidence: peer.confidence,
             evidence: peer.evidence,
+            ..Self::default()
         }
     }
 }
 
-#[derive(Clone)]
-struct TopicSeen {
-    evidence: Evidence,
-    types: BTreeSet<String>,
-    count: u64,
-    hz: Option<f64>,
-}
+/// The elements of one mission, by role and topic.
+type MissionSide = BTreeMap<Key, Known>;
 
-/// The names of an edge's ends in its direction.
-type EdgeNames = [String; 2];
-
-impl MissionSide {
-    fn of(mission: &Mission) -> Self {
-        let facts = &Facts::new(mission);
-        let mut seen = Self::default();
-        let elements = &mission.elements;
-        for role in facts.roles().filter(|role| !facts.is_tool(role.nodes)) {
-            let all = role
-                .nodes
-                .iter()
-                .map(|id| elements.nodes[*id].seen.evidence);
-            let confidence = if facts.is_sure(role.nodes) {
+fn side_of(mission: &Mission) -> MissionSide {
+    let facts = &Facts::new(mission);
+    let mut side = MissionSide::new();
+    let elements = &mission.elements;
+    for role in facts.roles().filter(|role| !facts.is_tool(role.nodes)) {
+        let nodes = role.nodes.iter();
+        let all = nodes.map(|id| elements.nodes[*id].seen.evidence);
+        let node = Known {
+            confidence: if facts.is_sure(role.nodes) {
                 Confidence::Stated
             } else {
                 Confidence::Inferred
-            };
-            let node = Seen {
-                confidence,
-                evidence: all.fold(Evidence::NONE, Evidence::and),
-            };
-            seen.nodes.insert(role.name.to_owned(), node);
-        }
-        for id in facts.topics(&Pattern::new("**")) {
-            let own = TopicIn { facts, id };
-            let rates = own.rates(true);
-            let nanos: i64 = rates.iter().map(|r| r.span.nanos()).sum();
-            let topic = TopicSeen {
-                evidence: elements.topics[id].seen.evidence,
-                types: own.types(),
-                count: facts.messages(id),
-                hz: (nanos > 0).then(|| Rate::mean_hz(&rates)),
-            };
-            let name = facts.topic(id);
-            for peer in facts.publishers(id) {
-                let key = [facts.role(peer.node), name].map(str::to_owned);
-                seen.publishes.insert(key, peer.into());
-            }
-            for peer in facts.subscribers(id) {
-                let key = [name, facts.role(peer.node)].map(str::to_owned);
-                seen.subscribes.insert(key, peer.into());
-            }
-            seen.topics.insert(name.to_owned(), topic);
-        }
-        let nodes = &seen.nodes;
-        seen.publishes
-            .retain(|[node, _], _| nodes.contains_key(node));
-        seen.subscribes
-            .retain(|[_, node], _| nodes.contains_key(node));
-        seen
+            },
+            evidence: all.fold(Evidence::NONE, Evidence::and),
+            ..Known::default()
+        };
+        side.insert(Key::Node(role.name.to_owned()), node);
     }
+    for id in facts.topics(&Pattern::new("**")) {
+        let (own, name) = (TopicIn { facts, id }, facts.topic(id).to_owned());
+        let ends = |peer: Peer| (facts.role(peer.node).to_owned(), name.clone());
+        for peer in facts.publishers(id) {
+            let (node, topic) = ends(peer);
+            side.insert(Key::Publish(node, topic), peer.into());
+        }
+        for peer in facts.subscribers(id) {
+            let (node, topic) = ends(peer);
+            side.insert(Key::Subscribe(topic, node), peer.into());
+        }
+        let rates = own.rates(true);
+        let nanos: i64 = rates.iter().map(|r| r.span.nanos()).sum();
+        let topic = Known {
+            evidence: elements.topics[id].seen.evidence,
+            types: own.types(),
+            count: Some(facts.messages(id)),
+            hz: (nanos > 0).then(|| Rate::mean_hz(&rates)),
+            ..Known::default()
+        };
+        side.insert(Key::Topic(name), topic);
+    }
+    let edges = side.keys().filter(|key| match key {
+        Key::Publish(node, _) | Key::Subscribe(_, node) => {
+            !side.contains_key(&Key::Node(node.clone()))
+        }
+        Key::Node(_) | Key::Topic(_) => false,
+    });
+    for edge in edges.cloned().collect::<Vec<Key>>() {
+        side.remove(&edge);
+    }
+    side
 }
 
 /// The mission of both. An element without evidence in one mission is drawn as the other has it.
@@ -130,14 +128,14 @@ pub(crate) fn union(
     differing: &[Difference],
     side: Side,
 ) -> Mission {
-    let (a, b) = (MissionSide::of(first), MissionSide::of(second));
+    let (a, b) = (side_of(first), side_of(second));
     let elements = elements(&a, &b);
     let span = |from: i64| Span::new(Stamp(from), Stamp(from + SECOND));
     let window = |index: usize, span: Span, seen: &MissionSide| Window {
         index,
         span,
         partial: false,
-        messages: seen.topics.values().map(|t| t.count).sum(),
+        messages: seen.values().filter_map(|known| known.count).sum(),
         changes: Vec::new(),
         events: Vec::new(),
     };
@@ -183,79 +181,70 @@ pub(crate) fn union(
     }
 }
 
+/// The elements of both with their combined evidence.
 fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
-    let nodes = both(&a.nodes, &b.nodes).into_iter();
-    let nodes = nodes.map(|(name, evidence)| Node {
-        name: name.as_str().into(),
-        role: name.as_str().into(),
-        seen: Existence::of(evidence),
-    });
-    let topics: BTreeSet<&String> = a.topics.keys().chain(b.topics.keys()).collect();
-    let topics = topics.into_iter().map(|name| {
-        let own = [a.topics.get(name), b.topics.get(name)];
-        let own = || own.into_iter().flatten();
-        let types: BTreeSet<&String> = own().flat_map(|t| &t.types).collect();
-        Topic {
-            name: name.as_str().into(),
-            types: types.into_iter().map(|t| t.as_str().into()).collect(),
-            seen: Existence::of(own().fold(Evidence::NONE, |all, t| all.and(t.evidence))),
-            ..Topic::default()
-        }
-    });
-    let ends = Elements {
-        nodes: nodes.collect(),
-        topics: topics.collect(),
-        ..Elements::default()
-    };
-    let edge = |node: &str, topic: &str, evidence: Evidence| {
-        Some(Edge {
-            node: ends.node(node)?,
-            topic: ends.topic(topic)?,
-            seen: Existence::of(evidence),
-        })
-    };
-    let publishes = both(&a.publishes, &b.publishes).into_iter();
-    let publishes = publishes.filter_map(|([node, topic], e)| edge(node, topic, e));
-    let subscribes = both(&a.subscribes, &b.subscribes).into_iter();
-    let subscribes = subscribes.filter_map(|([topic, node], e)| edge(node, topic, e));
-    Elements {
-        publishes: publishes.collect(),
-        subscribes: subscribes.collect(),
-        ..ends
+    let mut both: MissionSide = a.clone();
+    for (key, own) in b {
+        let known = both.entry(key.clone()).or_default();
+        known.evidence = known.evidence.and(own.evidence);
+        known.types.extend(own.types.iter().cloned());
     }
-}
-
-/// The keys of both maps with their combined evidence.
-fn both<'a, K: Ord>(
-    a: &'a BTreeMap<K, Seen>,
-    b: &'a BTreeMap<K, Seen>,
-) -> BTreeMap<&'a K, Evidence> {
-    let mut all: BTreeMap<&K, Evidence> = BTreeMap::new();
-    for (key, seen) in a.iter().chain(b) {
-        let slot = all.entry(key).or_insert(Evidence::NONE);
-        *slot = slot.and(seen.evidence);
+    let mut all = Elements::default();
+    // Nodes and topics come before edges.
+    for (key, known) in both {
+        let seen = Existence::of(known.evidence);
+        let edge = |elements: &Elements, node: &str, topic: &str| {
+            Some(Edge {
+                node: elements.node(node)?,
+                topic: elements.topic(topic)?,
+                seen: seen.clone(),
+            })
+        };
+        match key {
+            Key::Node(name) => {
+                let role = name.as_str().into();
+                let name = name.into();
+                all.nodes.push(Node { name, role, seen });
+            }
+            Key::Topic(name) => {
+                let types = known.types.iter().map(|t| t.as_str().into());
+                all.topics.push(Topic {
+                    name: name.into(),
+                    types: types.collect(),
+                    seen,
+                    ..Topic::default()
+                });
+            }
+            Key::Publish(node, topic) => {
+                if let Some(edge) = edge(&all, &node, &topic) {
+                    all.publishes.push(edge);
+                }
+            }
+            Key::Subscribe(topic, node) => {
+                if let Some(edge) = edge(&all, &node, &topic) {
+                    all.subscribes.push(edge);
+                }
+            }
+        }
     }
     all
 }
 
-fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
+fn graph(elements: &Elements, side: &MissionSide) -> Graph {
     let state = |what: Element| {
         let (node, topic) = elements.names(what);
-        let known = match what {
-            Element::Node(_) => seen.nodes.get(node?),
-            Element::Topic(_) => {
-                let topic = seen.topics.get(topic?)?;
-                return Some(ElementState {
-                    count: Some(topic.count),
-                    hz: topic.hz,
-                    ..ElementState::new(what, State::default(), Confidence::default())
-                });
-            }
-            Element::Publish(_) => seen.publishes.get(&[node?, topic?].map(str::to_owned)),
-            Element::Subscribe(_) => seen.subscribes.get(&[topic?, node?].map(str::to_owned)),
-        };
-        let confidence = known?.confidence;
-        Some(ElementState::new(what, State::default(), confidence))
+        let (node, topic) = (node.map(str::to_owned), topic.map(str::to_owned));
+        let known = side.get(&match what {
+            Element::Node(_) => Key::Node(node?),
+            Element::Topic(_) => Key::Topic(topic?),
+            Element::Publish(_) => Key::Publish(node?, topic?),
+            Element::Subscribe(_) => Key::Subscribe(topic?, node?),
+        })?;
+        Some(ElementState {
+            count: known.count,
+            hz: known.hz,
+            ..ElementState::new(what, State::default(), known.confidence)
+        })
     };
     Graph {
         states: elements.all().filter_map(state).collect(),
@@ -354,7 +343,8 @@ impl UnionLog<'_> {
 
     /// The different values.
     fn values(&self, difference: &Difference) -> Detail {
-        let topics = self.sides.map(|side| side.topics.get(&difference.element));
+        let topic = Key::Topic(difference.element.clone());
+        let topics = self.sides.map(|side| side.get(&topic));
         if let ("rate", [Some(from_hz), Some(to_hz)]) =
             (difference.kind, topics.map(|topic| topic?.hz))
         {

@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use super::{Subject, grouped};
+use super::{Subject, grouped, inert_groups};
 use crate::base::words;
 use crate::gate::finding::{Finding, Severity};
 use crate::gate::judge::{Judgement, Verdict};
@@ -24,9 +24,7 @@ pub(super) fn text(subject: &Subject<'_>, verdict: &Verdict) -> String {
             finding(subject, one, is_one, &mut hinted, &mut out);
         }
     }
-    out.push_str(&last_line(subject, verdict));
-    // GitHub's runners interpret this as a command anywhere in a line.
-    out.replace("##[", "#\\#[")
+    inert_groups(&(out + &last_line(subject, verdict)))
 }
 
 /// The last line: `nav.mcap against graph.yaml: 2 errors, 1 warning, 31 rules passed`.
@@ -98,8 +96,7 @@ pub(super) fn github(subject: &Subject<'_>, verdict: &Verdict) -> String {
     for line in text.lines() {
         let _ = writeln!(out, "{}", inert(line));
     }
-    // Runners interpret this as a command anywhere in a line.
-    out.replace("##[", "#\\#[")
+    inert_groups(&out)
 }
 
 fn annotation(

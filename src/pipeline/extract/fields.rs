@@ -8,13 +8,15 @@ use crate::bag::{Connection, ConnectionId, Input, Message, Sink, Want};
 use crate::base::error::{Error, Result};
 use crate::base::name::{NodeName, TopicName};
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::table::{Batch, ColumnKind, ColumnOf, TableCell, TableColumn, columns};
+use crate::base::table::{
+    Batch, ColumnKind, ColumnOf, TableCell, TableColumn, TableWriter, columns,
+};
 use crate::base::time::Stamp;
 use crate::base::words;
 use crate::evidence::message::fields::{Decoder, Decoders, KnownTypes};
 use crate::export::tables::TableFormat;
 use crate::export::tables::folder::{Folder, Part, file_stem};
-use crate::export::tables::writer::Writer;
+use crate::export::tables::writer::begin;
 use crate::pipeline::Watch;
 use crate::pipeline::collect::no_messages;
 use crate::view::none_pass;
@@ -80,18 +82,13 @@ fn nothing(job: &Extract, lost: &Lost) -> Error {
     if lost.types.is_empty() && is_whole {
         return no_messages(&job.inputs, &lost.notices);
     }
-    let path = job
-        .inputs
-        .first()
-        .map_or_else(String::new, Input::name)
-        .into();
+    let name = job.inputs.first().map_or_else(String::new, Input::name);
     let topics: Vec<&str> = lost.topics.iter().map(TopicName::as_str).collect();
     if let Some(error) = none_pass("--topic-filter", &job.topics, &topics) {
         return error;
     }
     if lost.types.is_empty() {
-        let hint = "`bagreel info` lists its topics and times".to_owned();
-        return Error::NoMessages { path, hint };
+        return Error::no_messages(&name, "`bagreel info` lists its topics and times");
     }
     let types = lost
         .types
@@ -100,7 +97,7 @@ fn nothing(job: &Extract, lost: &Lost) -> Error {
     let types = words::some_of(&types.collect::<Vec<String>>(), MOST_NAMED);
     let what = format!("no message could be decoded; {types}");
     let hint = "`--msg-path DIR` names a folder of `.msg`, `.srv`, `.action` or `.idl` files";
-    Error::unsupported(path, what, hint)
+    Error::unsupported(name, what, hint)
 }
 
 /// What the tables lack: the messages that could not be decoded, their types with a reason each, and notices; and all
@@ -135,7 +132,7 @@ struct FieldTable {
     rows: u64,
     /// Bytes of the messages in the batch.
     waiting: usize,
-    writer: Option<Writer<BufWriter<Part>>>,
+    writer: Option<Box<dyn TableWriter<BufWriter<Part>>>>,
 }
 
 const INDEX_COLUMNS: &[ColumnOf<(), FieldTable>] = columns! {
@@ -245,7 +242,7 @@ impl FieldTables {
     }
 
     /// Begins the file of a table under a unique name.
-    fn begin(&mut self, at: usize) -> io::Result<Writer<BufWriter<Part>>> {
+    fn begin(&mut self, at: usize) -> io::Result<Box<dyn TableWriter<BufWriter<Part>>>> {
         let table = &mut self.all[at];
         let stem = file_stem(&table.topic);
         let mut name = stem.clone();
@@ -257,7 +254,7 @@ impl FieldTables {
         table.file = format!("{name}.{}", self.format.word());
         let part = self.folder.file(table.file.clone());
         let facts = [("topic", table.topic.as_str()), ("type", &table.type_name)];
-        Writer::new(
+        begin(
             self.format,
             BufWriter::with_capacity(1 << 16, part),
             &table.batch,
@@ -268,11 +265,11 @@ impl FieldTables {
     /// Bounds the memory for encoded rows.
     fn unload(&mut self) -> io::Result<()> {
         let writers = || self.all.iter().filter_map(|t| t.writer.as_ref());
-        if writers().map(Writer::held).sum::<usize>() < MOST_HELD_IN_ALL {
+        if writers().map(|writer| writer.held()).sum::<usize>() < MOST_HELD_IN_ALL {
             return Ok(());
         }
         let mut writers = self.all.iter_mut().filter_map(|t| t.writer.as_mut());
-        writers.try_for_each(Writer::unload)
+        writers.try_for_each(|writer| writer.unload())
     }
 
     /// Writes the index of tables and files.
@@ -281,7 +278,7 @@ impl FieldTables {
         tables.sort_by_key(|t| (&t.topic, &t.file));
         let index = Batch::filled(INDEX_COLUMNS, &(), tables);
         let part = self.folder.file(format!("{INDEX}.{}", self.format.word()));
-        let mut writer = Writer::new(self.format, BufWriter::new(part), &index, &[])?;
+        let mut writer = begin(self.format, BufWriter::new(part), &index, &[])?;
         writer.write(&index)?;
         writer.finish()?.into_inner()?;
         Ok(())

@@ -9,7 +9,7 @@ use crate::base::table::{Batch, ColumnKind, TableCell, TableColumn};
 use crate::base::time::Stamp;
 use crate::evidence::times::{SeriesId, Stamps, Timed};
 use crate::export::sink::OutputSink;
-use crate::export::tables::writer::Writer;
+use crate::export::tables::writer::begin;
 use crate::pipeline::Watch;
 use crate::view::NameFilter;
 use std::collections::BTreeSet;
@@ -140,7 +140,7 @@ fn write(job: &Extract, taken: &mut Taken, sink: OutputSink, watch: &mut dyn Wat
     let failed = || Error::io("write", job.target.path());
     let sources = &taken.sources;
     let mut batch = table(sources);
-    let mut writer = Writer::new(job.format, sink, &batch, &[]).map_err(failed())?;
+    let mut writer = begin(job.format, sink, &batch, &[]).map_err(failed())?;
     let (mut rows, mut result) = (0, Ok(()));
     let each = |timed: Timed| {
         if result.is_err() {

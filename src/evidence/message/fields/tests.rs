@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::*;
 use crate::bag::ConnectionId;
+use crate::base::table::TableWriter as _;
 
 fn connection(type_name: &str, definition: &str, encoding: Encoding) -> Connection {
     Connection {
@@ -41,7 +42,7 @@ fn csv(connection: &Connection, data: &[u8]) -> String {
     let batch = decoded(connection, data).unwrap();
     let mut rows = crate::base::csv::CsvRows::new(Vec::new(), &batch).unwrap();
     rows.write(&batch).unwrap();
-    String::from_utf8(rows.finish().unwrap()).unwrap()
+    String::from_utf8(Box::new(rows).finish().unwrap()).unwrap()
 }
 
 #[test]

@@ -5,10 +5,10 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
-use super::{Group, Subject, grouped};
+use super::{Group, Subject, cell, grouped};
 use crate::base::words;
+use crate::export::markdown::{block, code, cut, folded, plain, row, table};
 use crate::export::mermaid::escaped;
-use crate::export::report::escape::{code, plain};
 use crate::gate::facts::Facts;
 use crate::gate::finding::{Finding, FindingKind, Severity};
 use crate::gate::judge::{Judgement, Verdict};
@@ -36,18 +36,14 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let mut groups = grouped(&broken);
     groups.sort_by_key(|group| (group.worst(), Reverse(group.findings.len())));
     causes(&groups, &mut out);
-    table(&facts, &groups, &mut out);
+    findings_table(&facts, &groups, &mut out);
     if let Some(chart) = chart(&facts, &broken) {
-        let open = "<details><summary>Graph around the changes</summary>";
-        let _ = writeln!(out, "{open}\n\n```mermaid\n{chart}```\n</details>\n");
+        let chart = block("mermaid", chart.trim_end());
+        out += &folded("Graph around the changes", &chart);
     }
     if broken.iter().any(|f| f.accept.is_some()) {
-        let open = "<details><summary>Accept these changes</summary>";
-        let _ = writeln!(
-            out,
-            "{open}\n\n{}\n</details>\n",
-            command(&subject.accept(None))
-        );
+        let command = block("sh", &subject.accept(None));
+        out += &folded("Accept these changes", &command);
     }
     undecidable(&of_severity(&[Severity::Unknown]), &mut out);
     let (bag, file) = (mark(&subject.name()), mark(&subject.tracked));
@@ -100,35 +96,29 @@ fn causes(groups: &[Group<'_>], out: &mut String) {
 }
 
 /// Writes the table of findings, those of one cause one after the other.
-fn table(facts: &Facts<'_>, groups: &[Group<'_>], out: &mut String) {
+fn findings_table(facts: &Facts<'_>, groups: &[Group<'_>], out: &mut String) {
     let rows = groups.iter().flat_map(|group| {
         let is_alone = group.findings.len() == 1;
-        group.findings.iter().map(move |f| row(facts, f, is_alone))
+        let rows = group.findings.iter();
+        rows.map(move |f| finding_row(facts, f, is_alone))
     });
     let mut rows: Vec<String> = rows.collect();
-    let all = rows.len();
-    let mut room = MOST_ROWS;
-    let fitting = rows.iter().take_while(|row| {
-        room = room.saturating_sub(row.len());
-        room > 0
-    });
-    rows.truncate(fitting.count());
-    let left_out = all - rows.len();
+    let left_out = cut(&mut rows, MOST_ROWS);
     let (shown, rest) = rows.split_at(rows.len().min(SHOWN));
-    let head = "| | what | when | seen | expected |\n|---|---|---|---|---|\n";
+    let heads = ["", "what", "when", "seen", "expected"];
     if !shown.is_empty() {
-        let _ = writeln!(out, "{head}{}", shown.concat());
+        let _ = writeln!(out, "{}", table(&heads, shown));
     }
     if !rest.is_empty() {
-        let open = format!("<details><summary>{} more</summary>", rest.len() + left_out);
-        let _ = writeln!(out, "{open}\n\n{head}{}\n</details>\n", rest.concat());
+        let summary = format!("{} more", rest.len() + left_out);
+        *out += &folded(&summary, &table(&heads, rest));
     }
     if left_out > 0 {
         let _ = writeln!(out, "{left_out} left out.\n");
     }
 }
 
-fn row(facts: &Facts<'_>, finding: &Finding, is_alone: bool) -> String {
+fn finding_row(facts: &Facts<'_>, finding: &Finding, is_alone: bool) -> String {
     let sign = if finding.severity == Severity::Error {
         "❌"
     } else {
@@ -145,23 +135,17 @@ fn row(facts: &Facts<'_>, finding: &Finding, is_alone: bool) -> String {
         }
         _ => String::new(),
     };
-    let cell = |text: &str| {
-        if text.is_empty() {
-            "–".to_owned()
-        } else {
-            value(text)
-        }
-    };
     // Pull requests are skimmed: the kind instead of the whole sentence.
     let word = finding.kind.word();
     let short = word.strip_prefix("node-").or(word.strip_prefix("topic-"));
     let what = short.unwrap_or(word).replace('-', " ");
-    format!(
-        "| {sign} | {} {what} | {when}{since} | {} | {} |\n",
-        code(&finding.name),
-        cell(&finding.seen),
-        cell(&finding.expected)
-    )
+    row(&[
+        sign.to_owned(),
+        format!("{} {what}", code(&finding.name)),
+        when + &since,
+        cell(&finding.seen, value),
+        cell(&finding.expected, value),
+    ])
 }
 
 /// A value: names as code, other words unchanged.
@@ -178,35 +162,20 @@ fn undecidable(findings: &[&Finding], out: &mut String) {
     if findings.is_empty() {
         return;
     }
-    let title = "What this bag cannot tell";
-    let open = format!("<details><summary>{title}: {}</summary>", findings.len());
-    let _ = writeln!(out, "{open}\n");
-    let start = out.len();
     let mut hinted = BTreeSet::new();
-    for (at, finding) in findings.iter().enumerate() {
+    let lines = findings.iter().map(|finding| {
         // Hints apply to all findings of a kind.
         let fresh = finding.help.iter().filter(|help| hinted.insert(*help));
         let help: Vec<String> = fresh.map(|help| format!(": {}", plain(help))).collect();
-        let line = format!("- {}{}\n", plain(&finding.text), help.concat());
-        if out.len() - start + line.len() > MOST_LISTED {
-            let _ = writeln!(out, "- {} more left out", findings.len() - at);
-            break;
-        }
-        out.push_str(&line);
+        format!("- {}{}\n", plain(&finding.text), help.concat())
+    });
+    let mut lines: Vec<String> = lines.collect();
+    match cut(&mut lines, MOST_LISTED) {
+        0 => {}
+        n => lines.push(format!("- {n} more left out\n")),
     }
-    out.push_str("\n</details>\n\n");
-}
-
-/// A command that can be copied: a block of code, whose fence is longer than any run of backticks inside.
-fn command(text: &str) -> String {
-    let mut longest = 0;
-    let mut run = 0;
-    for c in text.chars() {
-        run = if c == '`' { run + 1 } else { 0 };
-        longest = longest.max(run);
-    }
-    let fence = "`".repeat((longest + 1).max(3));
-    format!("{fence}sh\n{text}\n{fence}")
+    let summary = format!("What this bag cannot tell: {}", findings.len());
+    *out += &folded(&summary, &lines.concat());
 }
 
 /// A marker comment by which an action finds its earlier text, without characters that end the comment.

@@ -1,4 +1,5 @@
-//! Escapes texts from a bag for Markdown, so that they create no markup, HTML, mentions or links.
+//! Markdown for pull requests and job summaries, written here alone. Texts from a bag are escaped, so that they create no
+//! markup, HTML, mentions or links; long parts are cut or collapsed, since services refuse long texts.
 
 use std::fmt::Write as _;
 
@@ -60,6 +61,46 @@ pub(crate) fn address(url: &str) -> String {
         }
     }
     out
+}
+
+/// A row of a table.
+pub(crate) fn row(cells: &[String]) -> String {
+    format!("| {} |\n", cells.join(" | "))
+}
+
+/// A table of these rows.
+pub(crate) fn table(heads: &[&str], rows: &[String]) -> String {
+    // The column of signs has no head.
+    let heading = format!("| {} |", heads.join(" | ")).replacen("|  |", "| |", 1);
+    let rule = "---|".repeat(heads.len());
+    format!("{heading}\n|{rule}\n{}", rows.concat())
+}
+
+/// Keeps the first of these parts that have at most `most` bytes together; returns the number of the others.
+pub(crate) fn cut(parts: &mut Vec<String>, most: usize) -> usize {
+    let mut free = most;
+    let fits = |part: &&String| match free.checked_sub(part.len()) {
+        Some(rest) => {
+            free = rest;
+            true
+        }
+        None => false,
+    };
+    let (kept, all) = (parts.iter().take_while(fits).count(), parts.len());
+    parts.truncate(kept);
+    all - kept
+}
+
+/// Text that is collapsed until its summary is clicked.
+pub(crate) fn folded(summary: &str, inside: &str) -> String {
+    format!("<details><summary>{summary}</summary>\n\n{inside}\n</details>\n\n")
+}
+
+/// A block of code that can be copied, or that a service draws. Its fence is longer than any run of backticks inside.
+pub(crate) fn block(language: &str, code: &str) -> String {
+    let runs = code.split(|c| c != '`').map(str::len);
+    let fence = "`".repeat((runs.max().unwrap_or(0) + 1).max(3));
+    format!("{fence}{language}\n{code}\n{fence}")
 }
 
 #[cfg(test)]

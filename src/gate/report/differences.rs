@@ -4,60 +4,10 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use super::{Difference, Where};
+use super::{cell, inert_groups};
 use crate::base::words::{self, visible};
-use crate::export::report::escape::{code, plain};
-
-/// The two missions as given.
-#[derive(Clone, Debug)]
-pub struct DiffSubject {
-    /// The name of the first.
-    pub first: String,
-    /// The name of the second.
-    pub second: String,
-}
-
-/// A format of differences.
-#[derive(Clone, Copy, Debug)]
-pub struct DiffFormat {
-    pub(crate) word: &'static str,
-    pub(crate) endings: &'static [&'static str],
-    pub(crate) write: fn(&DiffSubject, &[Difference]) -> String,
-}
-
-impl DiffFormat {
-    /// The format of a word: `text`, `json` or `markdown`.
-    pub fn from_word(word: &str) -> Option<&'static Self> {
-        let word = if word == "md" { "markdown" } else { word };
-        DIFF_FORMATS.iter().find(|f| f.word == word)
-    }
-
-    /// The format of a file name, by its extension.
-    pub(crate) fn of_name(name: &str) -> Option<&'static Self> {
-        let name = name.to_ascii_lowercase();
-        let is_end = |f: &&Self| f.endings.iter().any(|end| name.ends_with(end));
-        DIFF_FORMATS.iter().find(is_end)
-    }
-}
-
-/// All formats.
-const DIFF_FORMATS: &[DiffFormat] = &[
-    DiffFormat {
-        word: "text",
-        endings: &[".txt"],
-        write: text,
-    },
-    DiffFormat {
-        word: "json",
-        endings: &[".json"],
-        write: json,
-    },
-    DiffFormat {
-        word: "markdown",
-        endings: &[".md", ".markdown"],
-        write: markdown,
-    },
-];
+use crate::export::markdown::{self, code, plain, row};
+use crate::gate::difference::{DiffSubject, Difference, Where};
 
 /// The most bytes of a table, half of the limit of a summary.
 const MOST: usize = 128 << 10;
@@ -116,7 +66,7 @@ fn known_first(all: &[Difference]) -> impl Iterator<Item = &Difference> {
     known.into_iter().chain(unknown)
 }
 
-fn text(subject: &DiffSubject, all: &[Difference]) -> String {
+pub(super) fn text(subject: &DiffSubject, all: &[Difference]) -> String {
     let long = all.iter().map(|d| visible(&d.name).chars().count()).max();
     let width = long.unwrap_or(0).min(MOST_ALIGNED);
     let mut out = String::new();
@@ -126,9 +76,7 @@ fn text(subject: &DiffSubject, all: &[Difference]) -> String {
         // Writing into a string does not fail.
         let _ = writeln!(out, "{sign} {kind:<10} {name:<width$}  {}", visible(&how));
     }
-    let out = out + &visible(&summary(subject, all)) + "\n";
-    // GitHub's runners interpret this as a command anywhere in a line.
-    out.replace("##[", "#\\#[")
+    inert_groups(&(out + &visible(&summary(subject, all)) + "\n"))
 }
 
 #[derive(Serialize)]
@@ -139,7 +87,7 @@ struct DifferenceJson<'a> {
     differences: Vec<&'a Difference>,
 }
 
-fn json(subject: &DiffSubject, all: &[Difference]) -> String {
+pub(super) fn json(subject: &DiffSubject, all: &[Difference]) -> String {
     let report = DifferenceJson {
         schema: "bagreel.diff/1",
         first: &subject.first,
@@ -149,7 +97,7 @@ fn json(subject: &DiffSubject, all: &[Difference]) -> String {
     crate::mission::info::json(&report)
 }
 
-fn markdown(subject: &DiffSubject, all: &[Difference]) -> String {
+pub(super) fn markdown(subject: &DiffSubject, all: &[Difference]) -> String {
     let known = all.iter().any(|d| d.is_known);
     let sign_of_all = if known { "🔀" } else { "✅" };
     let mut out = format!("### {sign_of_all} {}\n\n", plain(&summary(subject, all)));
@@ -157,45 +105,33 @@ fn markdown(subject: &DiffSubject, all: &[Difference]) -> String {
         return out;
     }
     let (known, unknown): (Vec<_>, Vec<_>) = all.iter().partition(|d| d.is_known);
-    table(subject, &known, &mut out);
+    if !known.is_empty() {
+        out += &table(subject, &known, MOST.saturating_sub(out.len()));
+        out.push('\n');
+    }
     if !unknown.is_empty() {
         let many = words::count(unknown.len(), "row");
-        let _ = writeln!(
-            out,
-            "<details><summary>{many} unknown in one of them</summary>\n"
-        );
-        table(subject, &unknown, &mut out);
-        out.push_str("</details>\n");
+        let rest = table(subject, &unknown, MOST.saturating_sub(out.len()));
+        out += markdown::folded(&format!("{many} unknown in one of them"), &rest).trim_end();
+        out.push('\n');
     }
     out
 }
 
-/// Writes a table of differences, up to the size limit.
-fn table(subject: &DiffSubject, rows: &[&Difference], out: &mut String) {
-    if rows.is_empty() {
-        return;
-    }
+/// A table of differences, up to `most` bytes.
+fn table(subject: &DiffSubject, all: &[&Difference], most: usize) -> String {
     let (first, second) = (code(&subject.first), code(&subject.second));
-    let _ = writeln!(
-        out,
-        "| | what | name | {first} | {second} |\n|---|---|---|---|---|"
-    );
-    let cell = |text: &str| {
-        if text.is_empty() {
-            "–".to_owned()
-        } else {
-            plain(text)
-        }
+    let heads = ["", "what", "name", &first, &second];
+    let rows = all.iter().map(|one| {
+        let [first, second] = [&one.first, &one.second].map(|value| cell(value, plain));
+        let (sign, name) = (sign(one).to_string(), code(&one.name));
+        row(&[sign, one.kind.to_owned(), name, first, second])
+    });
+    let mut rows: Vec<String> = rows.collect();
+    let cut = markdown::cut(&mut rows, most);
+    let left_out = match cut {
+        0 => String::new(),
+        n => format!("\n{n} more left out.\n"),
     };
-    for (at, one) in rows.iter().enumerate() {
-        let (sign, name) = (sign(one), code(&one.name));
-        let (first, second) = (cell(&one.first), cell(&one.second));
-        let row = format!("| {sign} | {} | {name} | {first} | {second} |\n", one.kind);
-        if out.len() + row.len() > MOST {
-            let _ = writeln!(out, "\n{} more left out.", rows.len() - at);
-            break;
-        }
-        out.push_str(&row);
-    }
-    out.push('\n');
+    markdown::table(&heads, &rows) + &left_out
 }

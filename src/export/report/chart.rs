@@ -1,13 +1,51 @@
-//! The part of the graph that changed, with its neighbours, small enough to be drawn in Markdown.
+//! The chart of a report: the part of the graph that changed, with its neighbours, small enough for Markdown.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
 
+use crate::base::words;
+use crate::draw::style::{BUILTIN, Style};
+use crate::export::{markdown, mermaid};
 use crate::view::{ArrowId, ItemId, Looks, Mark, SeenWindow, Shown, View};
 
 /// The most edges that are drawn.
 const MOST_EDGES: usize = 60;
 /// The most boxes that are drawn.
 const MOST_ITEMS: usize = 80;
+
+/// The most characters of a chart; a longer one is left out, as GitHub's Mermaid stops at 50,000.
+const MOST_CHART: usize = 45_000;
+/// The most edges of an expanded chart; larger ones are collapsed.
+const MOST_EDGES_OPEN: usize = 25;
+
+/// The chart of what changed, with its legend; nothing without changes.
+pub(super) fn chart(view: &View) -> String {
+    let Some((seen, left_out)) = changed(view) else {
+        return String::new();
+    };
+    // The picture's style may be dark, but Markdown has any background.
+    let Ok(style) = Style::builtin(BUILTIN[0].0) else {
+        return String::new();
+    };
+    let chart = mermaid::chart(view, &style, &seen);
+    if chart.len() > MOST_CHART {
+        return "The graph of the changes is too large for Markdown.\n\n".to_owned();
+    }
+    let mut out = markdown::block("mermaid", chart.trim_end());
+    out += "\n\nSolid green: present only at the end. Dashed orange: present only at the start. Purple: changed in between.\n";
+    if left_out > 0 {
+        let _ = writeln!(
+            out,
+            "\n{} left out of the graph.",
+            words::count(left_out, "edge")
+        );
+    }
+    let edges = words::count(seen.arrows.len(), "edge");
+    if seen.arrows.len() > MOST_EDGES_OPEN {
+        return markdown::folded(&format!("Graph of the changes ({edges})"), &out);
+    }
+    format!("Changed elements and their neighbours:\n\n{out}\n")
+}
 
 /// Every element that changed during the mission with its neighbours, as one window, and the number of edges
 /// left out; `None` without changes. An element is marked as added or removed if it exists only at the end or

@@ -1,11 +1,99 @@
-//! The medium of a picture, and a page with legible text for it.
+//! The options of a picture, and the medium for which it is drawn: its page, and the smallest text that is legible on it.
 
+use crate::base::error::Result;
 use crate::base::geometry::Size;
 use crate::base::words::worded;
 use crate::draw::figure::MOST_HEIGHT;
 use crate::draw::picture::PageOptions;
 use crate::draw::style::{PRINTED_NAMES, Style};
+use crate::draw::text::Fonts;
 use crate::draw::timeline::canvas::PX_PER_MM;
+use crate::layout::Engine;
+use crate::mission::Places;
+use crate::view::ViewOptions;
+
+/// The kind of picture of a mission.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Body {
+    /// A graph, or a topic timeline if the publishers of most messages are unknown.
+    #[default]
+    Auto,
+    /// The computation graph.
+    Graph,
+    /// The timeline of topics.
+    TopicTimeline,
+}
+
+/// The options of the picture.
+#[derive(Clone)]
+#[non_exhaustive]
+pub struct Drawing {
+    /// The kind of picture: graph or topic timeline.
+    pub body: Body,
+    /// The choice of what is shown.
+    pub view: ViewOptions,
+    /// Colours, strokes and fonts.
+    pub style: Style,
+    /// The fonts for all text.
+    pub fonts: Fonts,
+    /// The page with its title and orientation.
+    pub page: PageOptions,
+    /// Whether the user chose the size of the page, so that it may not grow.
+    pub is_sized: bool,
+    /// The medium, if it determines the page: see [`Drawing::seen`].
+    pub(crate) medium: Option<Medium>,
+    /// Whether to enlarge the page and collapse namespaces until the text is legible.
+    pub is_fitted: bool,
+    /// The layout engine.
+    pub engine: &'static (dyn Engine + Sync),
+    /// Positions of an earlier drawing, which are kept; new elements are placed beside them.
+    pub kept: Option<Places>,
+}
+
+impl Drawing {
+    /// The light style on a page of 1280×720 that may grow, as on the command line.
+    ///
+    /// # Errors
+    /// None in practice: the built-in style is valid.
+    pub fn new() -> Result<Self> {
+        Ok(Self {
+            body: Body::default(),
+            view: ViewOptions::default(),
+            style: Style::builtin("light")?,
+            fonts: Fonts::bundled(),
+            page: PageOptions::default(),
+            is_sized: false,
+            medium: None,
+            is_fitted: true,
+            engine: crate::layout::ENGINES[0].1,
+            kept: None,
+        })
+    }
+
+    /// The same drawing for this medium, which overrides page, text size and decorations.
+    #[must_use]
+    pub fn seen(self, purpose: Purpose) -> Self {
+        self.on(purpose.into())
+    }
+
+    /// The same drawing on the pages of a medium.
+    pub(crate) fn on(self, medium: Medium) -> Self {
+        Self {
+            page: medium.page(self.page),
+            style: medium.styled(self.style),
+            is_sized: true,
+            medium: Some(medium),
+            ..self
+        }
+    }
+
+    /// The smallest legible text, in pixels.
+    pub(super) fn readable(&self) -> f64 {
+        self.medium
+            .as_ref()
+            .map_or(SMALLEST, |medium| medium.readable)
+    }
+}
 
 worded! {
     /// The medium of a picture.
