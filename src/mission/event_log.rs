@@ -1,7 +1,7 @@
 //! The events of a mission, in continuous time: one list, made once from the full graph, independent of windows and views.
 //!
 //! In: the elements and the history of a mission. Out: an [`EventLog`], which all outputs read that show a change (badges,
-//! captions, marks, tables, pages), and its text. Begin with [`make`], which calls one file per kind of event and then `causes`,
+//! captions, marks, tables, pages), and its text. Begin with `make`, which calls one file per kind of event and then `causes`,
 //! which leaves one headline per cause; `changes` relates events to windows, `written` and `sentence` print the log.
 
 mod causes;

@@ -1,4 +1,4 @@
-//! A mission as JSON. In: a [`Mission`], or its text. Out: the other of the two, equal to what it was.
+//! A mission as JSON. In: a [`Mission`](super::Mission), or its text. Out: the other of the two, equal to what it was.
 //!
 //! Begin with `write`, which lists the keys of a mission; `elements`, `columns` and `events` are their values, each one struct for
 //! writing and for reading.
