@@ -145,6 +145,13 @@ impl Fitting<'_> {
             });
             self.take_higher_page();
         }
+        if !self.is_readable() && self.options().is_bundled {
+            self.show(ViewOptions {
+                hides_unread: true,
+                ..self.options().clone()
+            });
+            self.take_higher_page();
+        }
         if !self.is_readable() {
             self.show(ViewOptions {
                 are_leaves_in_words: true,
