@@ -372,8 +372,13 @@ mod tests {
                 hides_unread,
                 ..ViewOptions::default()
             };
-            let windows = ["/a>/t@5 /b</t /a>/scan@9 /c>/log@1 /b</never"];
-            let view = view(&mission(&windows), &options).0;
+            let windows = ["/a>/t@5 /b</t /a>/scan@9 /c>/log@1 /c>/never"; 2];
+            let mut mission = mission(&windows);
+            let topics = mission.elements.topics.iter_mut();
+            for topic in topics.filter(|topic| topic.name.as_str() != "/never") {
+                topic.seen.first = Some(mission.span.start);
+            }
+            let view = view(&mission, &options).0;
             let rows = view.rows.iter();
             let rows = rows.map(|row| format!("{} {}", view.items[row.owner].name, row.item.name));
             rows.collect::<Vec<_>>()
