@@ -136,6 +136,13 @@ impl Fitting<'_> {
             });
             self.take_higher_page();
         }
+        if !self.is_readable() && self.options().is_bundled {
+            self.show(ViewOptions {
+                hides_unread: true,
+                ..self.options().clone()
+            });
+            self.take_higher_page();
+        }
         if !self.is_readable() && self.options().is_still == Some(true) {
             // One box for the nodes of a namespace that are there in the same phases.
             let phases = self.mission.log.phases.iter().map(|phase| phase.span);

@@ -56,7 +56,7 @@ pub(crate) struct Words {
 impl Words {
     /// The words among the elements with a box: nodes without a line, and topics without a known endpoint. In bundles, the
     /// topics are those with an event although no line carries them; if they have one known endpoint, they get a box beside
-    /// it instead.
+    /// it instead, and so do those that it sends.
     pub(crate) fn new(
         mission: &Mission,
         options: &ViewOptions,
@@ -89,7 +89,13 @@ impl Words {
                 words.topics[at] = is_anything && all.is_empty();
                 continue;
             }
-            let is_seen = selection.topics[at].is_none() && reported.contains(&at);
+            // What a single node sends is a row of it.
+            let is_sent = !options.hides_unread
+                && all.len() == 1
+                && drawn[at]
+                && !ends[0].is_empty()
+                && elements.topics[at].seen.first.is_some();
+            let is_seen = selection.topics[at].is_none() && (is_sent || reported.contains(&at));
             let is_carried = drawn[at] && all.len() > 1 && !ends.iter().any(BTreeSet::is_empty);
             let is_inside = fold::of(keys, Element::Topic(at)).is_some();
             if is_inside || !is_seen || is_carried {
@@ -354,6 +360,31 @@ mod tests {
     fn topics_without_a_subscriber_are_drawn() {
         let found = words(&["/driver>/odom@5 /driver>/tf@9"]);
         assert_eq!(found.unwrap(), ["/tf"]);
+    }
+
+    #[test]
+    fn what_a_single_node_sends_is_a_row_of_it_where_there_is_room() {
+        let rows = |hides_unread| {
+            let options = ViewOptions {
+                mode: crate::view::Mode::Nodes,
+                is_picture: true,
+                is_bundled: true,
+                hides_unread,
+                ..ViewOptions::default()
+            };
+            let windows = ["/a>/t@5 /b</t /a>/scan@9 /c>/log@1 /c>/never"; 2];
+            let mut mission = mission(&windows);
+            let topics = mission.elements.topics.iter_mut();
+            for topic in topics.filter(|topic| topic.name.as_str() != "/never") {
+                topic.seen.first = Some(mission.span.start);
+            }
+            let view = view(&mission, &options).0;
+            let rows = view.rows.iter();
+            let rows = rows.map(|row| format!("{} {}", view.items[row.owner].name, row.item.name));
+            rows.collect::<Vec<_>>()
+        };
+        assert_eq!(rows(false), ["/a /scan", "/c /log"]);
+        assert!(rows(true).is_empty());
     }
 
     #[test]
