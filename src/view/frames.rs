@@ -516,31 +516,33 @@ pub(crate) struct Words {
     pub text: String,
 }
 
+/// What separates the phrases of a headline in one line.
+pub(crate) const BETWEEN_PHRASES: &str = "; ";
+
 /// A headline in one line.
 pub(crate) fn joined(words: &[Words]) -> String {
     let texts: Vec<&str> = words.iter().map(|words| &*words.text).collect();
-    texts.join("; ")
+    texts.join(BETWEEN_PHRASES)
 }
 
 impl Counts {
     /// The number of headlines of each kind.
     pub(crate) fn of<'a>(headlines: impl IntoIterator<Item = &'a Headline>) -> Self {
-        let mut counts = Self::default();
-        for headline in headlines {
-            *counts.slot(headline.kind, headline.what) += 1;
-        }
-        counts
+        Self::sum(headlines.into_iter().map(|h| (h.kind, h.what)))
     }
 
     /// The same for a box, in which a node that leaves is not back yet.
     pub(crate) fn inside<'a>(headlines: impl IntoIterator<Item = &'a Headline>) -> Self {
+        Self::sum(headlines.into_iter().map(|h| {
+            let kind = if h.leaves { Kind::Stopped } else { h.kind };
+            (kind, h.what)
+        }))
+    }
+
+    fn sum(all: impl Iterator<Item = (Kind, Element)>) -> Self {
         let mut counts = Self::default();
-        for headline in headlines {
-            let kind = match headline.kind {
-                _ if headline.leaves => Kind::Stopped,
-                kind => kind,
-            };
-            *counts.slot(kind, headline.what) += 1;
+        for (kind, what) in all {
+            *counts.slot(kind, what) += 1;
         }
         counts
     }

@@ -63,14 +63,15 @@ impl WindowMarks {
             if is_first || !viewed.sees(event.what) {
                 continue;
             }
+            let part = Part::of(event, span);
             changed.headlines.push(Headline {
                 event: id,
                 kind: event.kind,
                 what: event.what,
                 time: event.time,
-                leaves: Part::of(event, span) == Part::Leaves,
+                leaves: part == Part::Leaves,
             });
-            changed.report(viewed, event, id, Part::of(event, span));
+            changed.report(viewed, event, id, part);
             // A return has its own mark.
             let parts = parts.get(&id).filter(|_| event.kind != Kind::Restarted);
             for part in parts.into_iter().flatten() {

@@ -210,6 +210,9 @@ impl<'a> Now<'a> {
     /// The look of an item; `None` if no part of it exists. Ghosts are excluded.
     pub(crate) fn item(&self, id: ItemId) -> Option<Shown> {
         let item = self.viewed.items.get(id)?;
+        if !self.viewed.body(item).any(|what| self.lives.0.is(*what)) {
+            return None;
+        }
         let has_nodes = item.members.first().is_some_and(Element::is_node);
         let mut slot = None;
         for member in &item.members {
@@ -227,9 +230,6 @@ impl<'a> Now<'a> {
                 one.count = None;
             }
             gather(&mut slot, id.0, one);
-        }
-        if has_nodes && !self.viewed.body(item).any(|what| self.lives.0.is(*what)) {
-            return None;
         }
         let mut shown = slot?;
         if item.is_service {

@@ -158,9 +158,9 @@ impl Boxes<'_> {
         let (style, scale) = (&self.style.edge, self.fit.scale);
         let inset = if footer.cluster.is_some() { INSET } else { 0.0 };
         let seen = also.items.iter().zip(&also.shown).zip(&footer.names);
-        let seen =
-            seen.filter_map(|((item, shown), name)| Some((item, view.seen_at(shown, k)?, name)));
-        let seen: Vec<_> = seen.collect();
+        let seen: Vec<_> = seen
+            .filter_map(|((item, shown), name)| Some((item, view.seen_at(shown, k)?, name)))
+            .collect();
         let listed = listed(&seen, |(_, shown, _)| shown.mark.is_some());
         let texts = listed.iter().map(|at| {
             let (item, shown, short) = &seen[*at];

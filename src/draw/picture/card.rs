@@ -199,7 +199,7 @@ impl Boxes<'_> {
         let middle = place.centre().y;
         // The colour of the whole card already shows it.
         let owner = view.items_shown.get(row.owner);
-        let owner = owner.and_then(|shown| view.seen_at(shown, k)?.mark);
+        let owner = owner.and_then(|looks| looks.at(k)?.mark);
         let is_new = |mark: &Mark| owner.map(Mark::class) != Some(mark.class());
         if let Some(mark) = shown.mark.filter(is_new) {
             let inset = style.added.width / 2.0 * self.fit.pen;
@@ -208,13 +208,13 @@ impl Boxes<'_> {
                 Form::Rect(inside, 0.0),
                 options::change(style, mark).fill,
             ));
-            let at = Point::new(place.x, middle);
-            if !shown.is_one_of_many {
+            if let Some(mark) = shown.badge() {
+                let at = Point::new(place.x, middle);
                 badge::badge(&mut group, style, mark, at, self.fit.pen * BADGE);
             }
         }
         let (weight, quiet) = look.small;
-        let is_there = |at: usize| view.seen_at(&view.rows[at].shown, k).is_some();
+        let is_there = |at: usize| view.rows[at].shown.at(k).is_some();
         let left = Point::new(place.x + PAD * size, middle);
         let (font, words) = ((size, weight), line.words(is_there));
         group.text(Text::centred(Anchor::Start, left, font, look.text, words));

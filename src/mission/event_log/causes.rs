@@ -271,25 +271,20 @@ fn is_within(a: Stamp, b: Stamp, within: i64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evidence::{Confidence, Evidence};
+    use crate::graph::history::Bound;
 
     const SECOND: i64 = 1_000_000_000;
 
     fn event(kind: Kind, topic: u32, from: i64, until: Option<i64>) -> Event {
         let time = Stamp(from * SECOND);
-        Event {
-            kind,
-            what: Element::Topic(TopicId(topic)),
+        let at = Bound {
             time,
             earliest: time,
             latest: time,
+        };
+        Event {
             until: until.map(|at| Stamp(at * SECOND)),
-            detail: Detail::None,
-            confidence: Confidence::Measured,
-            evidence: Evidence::NONE,
-            part_of: None,
-            quiet: false,
-            weight: 1,
+            ..Event::new(kind, Element::Topic(TopicId(topic)), at)
         }
     }
 
