@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::base::geometry::Rect;
 use crate::draw::paint::raster::{Canvas, Painter};
-use crate::draw::scene::{Form, Piece, Shape};
+use crate::draw::scene::{Anchor, Form, Piece, Shape};
 use crate::view::testing::mission;
 use crate::view::{Mode, ViewOptions, view};
 
@@ -280,6 +280,49 @@ proptest! {
                     prop_assert!(r.x.is_finite() && r.y.is_finite() && r.w >= 0.0 && r.h >= 0.0, "{r:?}");
                 }
             }
+        }
+    }
+}
+
+#[test]
+fn a_headline_of_long_names_ends_before_the_clock() {
+    let name = |letter: &str| format!("/{}", letter.repeat(60));
+    let (a, b, t) = (name("a"), name("b"), name("t"));
+    let all = format!("{a}>{t}@5 {b} =/rate@5");
+    let after = format!("{a} {b}>{t}@5 =/rate@50");
+    for wide in [320.0, 640.0, 1280.0] {
+        let options = PageOptions {
+            size: Size::new(wide, 400.0),
+            ..PageOptions::default()
+        };
+        let windows = [all.as_str(), after.as_str()];
+        let scene = with_picture(&windows, "light", options, |picture| picture.scene(1));
+        let fonts = Fonts::bundled();
+        let ends = |id: &str| -> Vec<[f64; 3]> {
+            let group = scene.groups.iter().find(|group| group.id == id).unwrap();
+            let texts = group.pieces.iter().filter_map(|piece| match piece {
+                Piece::Text(text) => Some(text),
+                Piece::Shape(_) => None,
+            });
+            let ends = texts.map(|text| {
+                let wide = fonts.width(&text.text, text.size, text.weight);
+                let left = match text.anchor {
+                    Anchor::End => text.at.x - wide,
+                    _ => text.at.x,
+                };
+                [left, left + wide, text.at.y]
+            });
+            ends.collect()
+        };
+        let clock = ends("clock");
+        let headline = ends("headline");
+        assert!(headline.len() > 1);
+        for [_, right, y] in headline.into_iter().chain(ends("note")) {
+            let beside = clock.iter().min_by(|a, b| {
+                let far = |end: &[f64; 3]| (end[2] - y).abs();
+                far(a).total_cmp(&far(b))
+            });
+            assert!(right < beside.unwrap()[0], "{right} on {wide} px");
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::base::words;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Stroke, Text, line};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
-use crate::view::{Frame, View, Words, joined};
+use crate::view::{BETWEEN_PHRASES, Frame, View, Words, joined};
 
 /// The usual width of a character, as a share of the size of the text.
 const USUAL_WIDTH: f64 = 0.5;
@@ -75,33 +75,28 @@ impl<'a> Title<'a> {
         });
         let mut below = vec![phase.to_owned()];
         let mut second = Point::new(self.left(), LINES.1);
-        let mut rest = room.1;
         if frame.caption.is_empty() {
-            let mut sizes = SMALLER.map(|part| size * part).into_iter();
             let (main, other) = match frame.empty {
                 Some(_) => (&empty, Some(&frame.note)),
                 None => (&frame.note, None),
             };
             below.extend(other.cloned());
-            let fits = |size: &f64| self.width(main, *size, Weight::Regular) <= room.0;
-            let font = (sizes.find(fits).unwrap_or(size), Weight::Regular);
+            let found = self.largest(main, size, Weight::Regular, room.0);
+            let font = (found.unwrap_or(size), Weight::Regular);
             let text = self.cut(main, font.0, font.1, room.0);
             let at = Point::new(self.left(), LINES.0);
             note.text(self.text(text, at, font, style.quiet));
         } else {
-            headline.title = joined(&frame.fitting(|_| true));
-            let told = self.told(frame, room, size);
+            let all = frame.fitting(|_| true);
+            headline.title = joined(&all);
+            let (lines, size) = self.lines(frame, all, room, size);
             let mut first = Point::new(self.left(), LINES.0);
-            if told.lines.len() > 1 {
+            if lines.len() > 1 {
                 (first.y, second.y) = TWO_LINES;
             }
-            let ats = [&mut first, &mut second];
-            for (line, at) in told.lines.iter().zip(ats) {
-                let from = at.x;
-                self.line(&mut headline, line, at, told.size);
-                if told.lines.len() > 1 {
-                    rest = room.1 - (at.x - from);
-                }
+            let ats = [(&mut first, room.0), (&mut second, room.1)];
+            for (line, (at, most)) in lines.iter().zip(ats) {
+                self.line(&mut headline, line, at, most, size);
             }
             below.extend(frame.note.split(NOTES).map(str::to_owned));
             below.push(empty);
@@ -111,6 +106,7 @@ impl<'a> Title<'a> {
         }
         below.retain(|part| !part.is_empty());
         // Behind words there is room for whole parts only.
+        let rest = room.1 - (second.x - self.left());
         let is_behind = second.x > self.left();
         let gap = if is_behind { small } else { 0.0 };
         let fits =
@@ -126,49 +122,60 @@ impl<'a> Title<'a> {
         vec![headline, note, clock]
     }
 
-    /// The headline in as many words as fit, in one line or in two.
-    fn told(&self, frame: &Frame, room: (f64, f64), size: f64) -> Told {
-        let wide = |words: &[Words], size: f64| self.width(&joined(words), size, Weight::SemiBold);
-        let all = frame.fitting(|_| true);
-        // All words at a slightly smaller size are better than some of them.
+    /// The largest size at which a text fits; all words at a slightly smaller size are better than some of them.
+    fn largest(&self, text: &str, size: f64, weight: Weight, most: f64) -> Option<f64> {
         let mut sizes = SMALLER.map(|part| size * part).into_iter();
-        if let Some(size) = sizes.find(|size| wide(&all, *size) <= room.0) {
-            let lines = vec![all];
-            return Told { lines, size };
+        sizes.find(|size| self.width(text, *size, weight) <= most)
+    }
+
+    /// The headline in as many words as fit, in one line or in two, and their size; `all` are all of its words.
+    fn lines(
+        &self,
+        frame: &Frame,
+        all: Vec<Words>,
+        room: (f64, f64),
+        size: f64,
+    ) -> (Vec<Vec<Words>>, f64) {
+        if let Some(size) = self.largest(&joined(&all), size, Weight::SemiBold, room.0) {
+            return (vec![all], size);
         }
         let size = size * SMALLEST;
-        let broken = |words: &[Words]| {
-            let first = (1..words.len()).rev();
-            let mut first = first.filter(|at| wide(&words[..*at], size) <= room.0);
-            let at = first.next()?;
-            (wide(&words[at..], size) <= room.1).then_some(at)
+        let fits =
+            |words: &[Words], most: f64| self.width(&joined(words), size, Weight::SemiBold) <= most;
+        // The number of phrases in the first line.
+        let first = |words: &[Words]| {
+            let mut ends = (1..=words.len()).rev();
+            let first = ends.find(|end| fits(&words[..*end], room.0))?;
+            fits(&words[first..], room.1).then_some(first)
         };
-        let words = frame.fitting(|words| wide(words, size) <= room.0 || broken(words).is_some());
-        let lines = match broken(&words) {
-            Some(at) if wide(&words, size) > room.0 => {
-                vec![words[..at].to_vec(), words[at..].to_vec()]
-            }
-            _ => vec![words],
-        };
-        Told { lines, size }
+        let mut words = frame.fitting(|words| first(words).is_some());
+        let second = words.split_off(first(&words).unwrap_or(words.len()));
+        let lines = [words, second].into_iter().filter(|line| !line.is_empty());
+        (lines.collect(), size)
     }
 
     /// Writes a line of the headline from `at` on, each of its words in the colour of their change, and moves `at` to its
-    /// end.
-    fn line(&self, headline: &mut Group, line: &[Words], at: &mut Point, size: f64) {
+    /// end. If it is wider than `most`, its first words are cut.
+    fn line(&self, headline: &mut Group, line: &[Words], at: &mut Point, most: f64, size: f64) {
         let style = &self.style.title;
-        let most = self.page.title.right() - self.left() - at.x;
+        let end = at.x + most;
         for (k, words) in line.iter().enumerate() {
-            let end = if k + 1 < line.len() { "; " } else { "" };
+            let between = if k + 1 < line.len() {
+                BETWEEN_PHRASES
+            } else {
+                ""
+            };
             let color = match words.sign {
                 Some('+') => style.added,
                 Some('−') => style.removed,
                 Some(_) => style.changed,
                 None => style.text,
             };
-            let text = format!("{}{end}", words.text);
+            let text = format!("{}{between}", words.text);
+            let wide = |text: &str| self.fonts.width(text, size, Weight::SemiBold);
+            let most = end - at.x - wide(&joined(&line[k + 1..]));
             let text = self.cut(&text, size, Weight::SemiBold, most);
-            let wide = self.fonts.width(&text, size, Weight::SemiBold);
+            let wide = wide(&text);
             headline.text(self.text(text, *at, (size, Weight::SemiBold), color));
             at.x += wide;
         }
@@ -201,12 +208,12 @@ impl<'a> Title<'a> {
         parts.retain(|part| !part.is_empty());
         let (size, small) = (style.clock_size * unit, style.quiet_size * unit);
         let most = self.page.title.w * MOST_RIGHT;
-        let wide = |parts: &[String]| self.width(&parts.join(" · "), small, Weight::Regular);
+        let wide = |parts: &[String]| self.width(&parts.join(NOTES), small, Weight::Regular);
         // On a narrow page the date is dropped first.
         while parts.len() > 1 && wide(&parts) > most {
             parts.pop();
         }
-        let below = self.cut(&parts.join(" · "), small, Weight::Regular, most);
+        let below = self.cut(&parts.join(NOTES), small, Weight::Regular, most);
         let all = self.page.title.w - 2.0 * self.left() - GAP * unit;
         let room = (
             (all - self.width(&time, size, Weight::SemiBold)).max(1.0),
@@ -231,8 +238,9 @@ impl<'a> Title<'a> {
 
     /// The width of a text, with a margin, as an SVG shown in another font may be wider.
     fn width(&self, text: &str, size: f64, weight: Weight) -> f64 {
+        let text = self.fonts.shown(text);
         let elsewhere = text.chars().count() as f64 * size * USUAL_WIDTH;
-        self.fonts.width(text, size, weight).max(elsewhere)
+        self.fonts.width(&text, size, weight).max(elsewhere)
     }
 
     fn cut(&self, text: &str, size: f64, weight: Weight, most: f64) -> String {
@@ -259,12 +267,6 @@ impl<'a> Title<'a> {
 fn events(frame: &Frame) -> String {
     let ids = frame.events().map(|event| event.to_string());
     ids.collect::<Vec<_>>().join(" ")
-}
-
-/// A headline as it is written.
-struct Told {
-    lines: Vec<Vec<Words>>,
-    size: f64,
 }
 
 /// The sizes of a headline in one line, as parts of the largest.
