@@ -73,6 +73,7 @@ fn assembled(viewed: items::Viewed<'_>, options: &ViewOptions, frames: frames::F
         items_shown: frames.items,
         arrows_shown: frames.arrows,
         frames: frames.list,
+        lists_few: options.is_bundled,
         ..View::default()
     };
     let boxes = view.items.len() - viewed.in_words;
@@ -146,6 +147,8 @@ pub struct Item {
     pub members: Vec<Element>,
     /// The names of its other nodes, sorted, if several that are alike share the box.
     pub others: Vec<Arc<str>>,
+    /// The names of topics that it alone is connected to and that have no row; they are counted beside its name.
+    pub counted: Vec<Arc<str>>,
     /// Whether its members are the counterparts of each other in several equal namespaces.
     pub is_replica: bool,
     /// Whether it is a service: its clients write to it, and its server reads it.
@@ -332,6 +335,8 @@ pub struct View {
     pub namespaces: Vec<Namespace>,
     /// The topics that are listed as rows in boxes.
     pub rows: Vec<CardRow>,
+    /// Whether a box lists at most three of these, else two and the number of the others.
+    pub lists_few: bool,
     /// The nodes and topics that are listed as words, by namespace.
     pub also: Vec<AlsoHere>,
     /// The windows.

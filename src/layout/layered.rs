@@ -3,6 +3,7 @@
 //! It alone calls the other files of this folder, one after the other.
 
 pub(crate) mod acyclic;
+pub(crate) mod blocks;
 pub(crate) mod crossings;
 pub(crate) mod fold;
 pub(crate) mod inside;
@@ -30,6 +31,8 @@ use order::Search;
 
 /// The space between parts.
 const PART_GAP: f64 = 20.0;
+/// The most parts of which small ones are placed in the gaps of others.
+const MOST_NESTED: usize = 24;
 /// The largest number of edges of a part that is cut in several ways; a larger one is cut only in the way that keeps it
 /// small.
 const MANY: usize = 300;
@@ -312,6 +315,9 @@ fn quality(
 ) -> f64 {
     let links = links.max(1) as f64;
     let fit = pack::fit(size, options.page);
+    // A drawing of no use is worse than its size alone says.
+    let useless = (options.least / fit).clamp(1.0, MOST_USELESS);
+    let fit = fit / (useless * useless);
     if options.is_tight {
         return fit / (1.0 + TIGHT_CROSSING * crossings as f64 / links);
     }
@@ -320,6 +326,9 @@ fn quality(
     let shortness = libm::pow((length / links).max(1.0), -LENGTH);
     readable * shortness / (1.0 + CROSSING * crossings as f64 / links)
 }
+
+/// The share of the smallest useful scale below which all drawings are equally useless: a sketch has no useful scale.
+const MOST_USELESS: f64 = 4.0;
 
 /// The largest rounding error in the quality of a drawing.
 const ROUNDING: f64 = 1.0 + 1e-9;
@@ -377,7 +386,13 @@ fn best_block(
     let ways = ways.filter(|way| seen.insert(&way.layers.rank[..way.layers.vertices]));
     let wraps = ways.flat_map(|way| wrap::wraps(plan, options, part, &way.layers, orientation));
     let others = inside.into_iter().chain(wraps).map(judged);
-    others.fold(best, better).1
+    let best = others.fold(best, better);
+    let judge = |block: &PlacedPart| {
+        let length = block.routes.iter().map(Route::length).sum();
+        quality(block.size, block.crossings, length)
+    };
+    let blocks = blocks::best(plan, options, part, orientation, judge);
+    blocks.into_iter().fold(best, better).1
 }
 
 fn block(
@@ -461,15 +476,28 @@ impl PlacedPart {
 }
 
 impl PlacedPart {
-    /// The block with the places that its labels probably take, above lines to the right and beside lines down, so that
-    /// they do not cover the block next to it.
+    /// The block with the places that its labels probably take, so that they do not cover the block next to it.
     fn with_labels(&self, plan: &Plan, part: &Component, orientation: Orientation) -> Rect {
         let block = Rect::new(0.0, 0.0, self.size.w, self.size.h);
+        let labels = self.labels(plan, part, orientation);
+        labels.fold(block, |all, label| all.union(&label))
+    }
+
+    /// The places that labels take: where they are placed, else probably above lines to the right and beside lines down.
+    fn labels<'a>(
+        &'a self,
+        plan: &'a Plan,
+        part: &'a Component,
+        orientation: Orientation,
+    ) -> impl Iterator<Item = Rect> + 'a {
         let labels = part.links.iter().zip(&self.routes);
-        let labels = labels
+        labels
             .filter(|_| plan.is_labelled)
-            .filter_map(|(&i, route)| {
+            .filter_map(move |(&i, route)| {
                 let size = plan.links[i].label?;
+                if let Some(middle) = route.label {
+                    return Some(Rect::around(middle, size));
+                }
                 let line = Rect::of_points(route.points())?;
                 let middle = line.centre();
                 Some(match orientation {
@@ -480,8 +508,21 @@ impl PlacedPart {
                         Rect::new(line.right(), middle.y - size.h / 2.0, size.w, size.h)
                     }
                 })
-            });
-        labels.fold(block, |all, label| all.union(&label))
+            })
+    }
+
+    /// The places that its boxes, frames, lines and labels take.
+    fn taken(&self, plan: &Plan, part: &Component, orientation: Orientation) -> Vec<Rect> {
+        let pieces = self.routes.iter().flat_map(|route| {
+            let starts = route.curves.iter().map(|curve| curve[2]);
+            let starts = std::iter::once(route.start).chain(starts);
+            starts
+                .zip(&route.curves)
+                .filter_map(|(start, curve)| Rect::of_points(std::iter::once(start).chain(*curve)))
+        });
+        let solid = self.boxes.iter().chain(&self.clusters).copied();
+        let labels = self.labels(plan, part, orientation);
+        solid.chain(pieces).chain(labels).collect()
     }
 }
 
@@ -498,7 +539,20 @@ pub(crate) fn assembled(
         .map(|(part, block)| block.with_labels(plan, part, orientation))
         .collect();
     let sizes: Vec<Size> = bounds.iter().map(|b| Size::new(b.w, b.h)).collect();
-    let (corners, size) = pack::pack(&sizes, options.page, PART_GAP);
+    let (mut corners, mut size) = pack::pack(&sizes, options.page, PART_GAP);
+    if (2..=MOST_NESTED).contains(&parts.len()) && plan.links.len() <= MANY {
+        let taken = parts.iter().zip(&blocks).zip(&bounds);
+        let taken = taken.map(|((part, block), bounds)| {
+            let corner = Point::new(-bounds.x, -bounds.y);
+            let taken = block.taken(plan, part, orientation).into_iter();
+            taken.map(|rect| rect.moved(corner)).collect()
+        });
+        let shapes: Vec<Vec<Rect>> = taken.collect();
+        let nested = pack::nested(&sizes, &shapes, options.page, PART_GAP);
+        if pack::fit(nested.1, options.page) > pack::fit(size, options.page) {
+            (corners, size) = nested;
+        }
+    }
     let crossings = blocks.iter().map(|block| block.crossings).sum();
     let mut layout = Layout {
         orientation,

@@ -1,6 +1,6 @@
 //! The packing of blocks side by side: shelves, tallest first, towards the page's aspect.
 
-use crate::base::geometry::{Point, Size};
+use crate::base::geometry::{Point, Rect, Size};
 
 /// Top left corners for blocks of these sizes, `gap` apart, and the size of the whole. Several widths are
 /// tried, and the one with the largest scale on the page is used.
@@ -23,6 +23,61 @@ pub(crate) fn pack(sizes: &[Size], page: Size, gap: f64) -> (Vec<Point>, Size) {
             |(_, places, whole)| (places, whole),
         )
 }
+
+/// Top left corners for blocks of these sizes, at least `gap` from what the others take (`taken`, for each block relative
+/// to its corner), and the size of the whole: the largest block first, each further one where the whole stays largest on
+/// the page, in a gap of an earlier one if it fits.
+pub(crate) fn nested(
+    sizes: &[Size],
+    taken: &[Vec<Rect>],
+    page: Size,
+    gap: f64,
+) -> (Vec<Point>, Size) {
+    let mut order: Vec<usize> = (0..sizes.len()).collect();
+    let area = |i: &usize| sizes[*i].w * sizes[*i].h;
+    order.sort_by(|a, b| area(b).total_cmp(&area(a)).then(a.cmp(b)));
+    let mut places = vec![Point::default(); sizes.len()];
+    let (mut whole, mut full) = (Size::default(), Vec::<Rect>::new());
+    for i in order {
+        let start = || std::iter::once(0.0);
+        let mut xs: Vec<f64> = start()
+            .chain(full.iter().map(|r| r.right() + gap))
+            .collect();
+        let mut ys: Vec<f64> = start()
+            .chain(full.iter().map(|r| r.bottom() + gap))
+            .collect();
+        for along in [&mut xs, &mut ys] {
+            along.sort_by(f64::total_cmp);
+            along.dedup_by(|a, b| (*a - *b).abs() < SAME);
+        }
+        let mut best: Option<(f64, Point, Size)> = None;
+        for at in ys
+            .iter()
+            .flat_map(|y| xs.iter().map(|x| Point::new(*x, *y)))
+        {
+            let size = Size::new(
+                whole.w.max(at.x + sizes[i].w),
+                whole.h.max(at.y + sizes[i].h),
+            );
+            let scale = fit(size, page);
+            if best.as_ref().is_some_and(|best| best.0 >= scale) {
+                continue;
+            }
+            let own = Rect::new(at.x, at.y, sizes[i].w, sizes[i].h).grown(gap - SAME);
+            if !full.iter().any(|other| other.overlaps(&own)) {
+                best = Some((scale, at, size));
+            }
+        }
+        if let Some((_, at, size)) = best {
+            (places[i], whole) = (at, size);
+            full.extend(taken[i].iter().map(|rect| rect.moved(at)));
+        }
+    }
+    (places, whole)
+}
+
+/// The difference below which two positions are the same, in pixels.
+const SAME: f64 = 0.5;
 
 /// The scale at which a drawing fills the page.
 pub(crate) fn fit(whole: Size, page: Size) -> f64 {

@@ -146,7 +146,7 @@ impl From<Purpose> for Medium {
             has_legend,
         };
         match purpose {
-            Purpose::Readme => screen(830.0, &[467.0, 560.0, 680.0, 830.0], false),
+            Purpose::Readme => screen(830.0, &[467.0, 560.0, 680.0, 830.0, 1100.0], false),
             Purpose::Slide => screen(1280.0, &[720.0], true),
             Purpose::Column => Self::paper(88.0, NAMES),
             Purpose::Page => Self::paper(181.0, NAMES),

@@ -138,7 +138,7 @@ impl Fitting<'_> {
         }
         if !self.is_readable() && self.options().is_bundled {
             self.show(ViewOptions {
-                hides_unread: true,
+                counts_rows: true,
                 ..self.options().clone()
             });
             self.take_higher_page();
@@ -159,26 +159,39 @@ impl Fitting<'_> {
             });
             self.take_higher_page();
         }
+        if !self.is_readable() && self.options().is_bundled {
+            self.show(ViewOptions {
+                are_unlinked_in_words: true,
+                ..self.options().clone()
+            });
+            self.take_higher_page();
+        }
         let spared = self.collapse_the_steady();
         self.collapse_the_rest(spared);
         if self.is_readable() {
             self.open_again();
+            self.list_rows_again();
         } else {
             self.bundle();
         }
         self.take_lower_page();
     }
 
-    /// Takes the lowest page of a purpose on which everything is legible, else the one with the largest text.
+    /// Takes the lowest page of a purpose on which everything is legible, else the highest if its text is larger.
     fn take_higher_page(&mut self) {
-        for size in self.sizes().into_iter().skip(1) {
-            if self.is_readable() {
-                return;
-            }
-            let attempt = self.attempt(self.options().clone(), self.page_of(size));
-            if attempt.text > self.best.text || !attempt.is_laid_out {
-                self.best = attempt;
-            }
+        let Some(highest) = self.sizes().pop() else {
+            return;
+        };
+        if self.is_readable() || self.page().size == highest {
+            return;
+        }
+        let attempt = self.attempt(self.options().clone(), self.page_of(highest));
+        let is_readable = attempt.is_readable(self.drawing);
+        if attempt.text > self.best.text || !attempt.is_laid_out {
+            self.best = attempt;
+        }
+        if is_readable {
+            self.take_lower_page();
         }
     }
 
@@ -335,6 +348,20 @@ impl Fitting<'_> {
             let mut opened = self.options().clone();
             opened.collapse.retain(|n| n != name);
             let attempt = self.attempt(opened, self.page().clone());
+            if attempt.is_readable(self.drawing) {
+                self.best = attempt;
+            }
+        }
+    }
+
+    /// Lists the rows of boxes again if there is room for them after all.
+    fn list_rows_again(&mut self) {
+        if self.options().counts_rows && !self.options().are_unlinked_in_words {
+            let options = ViewOptions {
+                counts_rows: false,
+                ..self.options().clone()
+            };
+            let attempt = self.attempt(options, self.page().clone());
             if attempt.is_readable(self.drawing) {
                 self.best = attempt;
             }

@@ -136,6 +136,16 @@ impl<'a> Viewed<'a> {
             };
             members.iter().all(is)
         };
+        let counted = |members: &[(&ItemKey, Element)]| {
+            let nodes = members.iter().filter_map(|(_, what)| match what {
+                Element::Node(id) => Some(&words.counted[*id]),
+                _ => None,
+            });
+            let topics = nodes.flatten();
+            topics
+                .map(|at| elements.topics[*at].name.shared())
+                .collect()
+        };
         let shown = sorted(shown.collect());
         let (boxes, in_words): (Vec<_>, Vec<_>) = together(&shown).partition(|m| !is_in_words(m));
         self.in_words = in_words.len();
@@ -147,6 +157,7 @@ impl<'a> Viewed<'a> {
                 label: Arc::clone(name),
                 others: Vec::new(),
                 is_replica: *kind != ItemKind::Namespace && self.fleets.has(name),
+                counted: counted(members),
                 is_service: members.iter().all(|(_, what)| elements.is_service(*what)),
                 cluster: None,
                 members: members.iter().map(|(_, what)| *what).collect(),

@@ -51,6 +51,8 @@ fn with_changing(mission: &Mission, mut drawn: ById<TopicId, bool>) -> ById<Topi
 pub(crate) struct Words {
     nodes: ById<NodeId, bool>,
     topics: ById<TopicId, bool>,
+    /// The topics of each node that are only counted.
+    pub(crate) counted: ById<NodeId, Vec<TopicId>>,
 }
 
 impl Words {
@@ -67,6 +69,7 @@ impl Words {
         let mut words = Self {
             nodes: ById::like(&elements.nodes, false),
             topics: ById::like(&elements.topics, false),
+            counted: ById::like(&elements.nodes, Vec::new()),
         };
         if !options.is_picture {
             return words;
@@ -89,9 +92,8 @@ impl Words {
                 words.topics[at] = is_anything && all.is_empty();
                 continue;
             }
-            // What a single node sends is a row of it.
-            let is_sent = !options.hides_unread
-                && all.len() == 1
+            // What a single node sends is a row of it, and what several send and nobody reads is a word.
+            let is_sent = (all.len() == 1 || ends[1].is_empty())
                 && drawn[at]
                 && !ends[0].is_empty()
                 && elements.topics[at].seen.first.is_some();
@@ -102,10 +104,20 @@ impl Words {
                 continue;
             }
             words.topics[at] = all.len() != 1;
-            if let Some(owner) = all.first().filter(|_| all.len() == 1) {
+            let is_counted =
+                options.counts_rows && is_sent && all.len() == 1 && !reported.contains(&at);
+            if let Some(owner) = all.first().filter(|_| all.len() == 1)
+                && !(is_counted && options.are_unlinked_in_words)
+            {
                 for (node, word) in words.nodes.ids().zip(words.nodes.iter_mut()) {
                     *word &= fold::of(keys, Element::Node(node)) != Some(*owner);
                 }
+            }
+            if is_counted {
+                for node in &wiring.publishers[at] {
+                    words.counted[*node].push(at);
+                }
+                continue;
             }
             if let Some(key) = keys.of_mut(Element::Topic(at)) {
                 let name = elements.topics[at].name.shared();
@@ -152,7 +164,7 @@ fn nodes(
     }
     let is_hub = |node: NodeId| partners[node] == Some(node);
     let is_word = |(node, partner): (NodeId, &Option<NodeId>)| match *partner {
-        None => options.is_bundled || !changing[node].itself,
+        None => options.are_unlinked_in_words || !changing[node].itself,
         Some(other) if other != node && options.are_leaves_in_words => {
             is_hub(other) && !changing[node].any && !changing[other].itself
         }
@@ -364,12 +376,12 @@ mod tests {
 
     #[test]
     fn what_a_single_node_sends_is_a_row_of_it_where_there_is_room() {
-        let rows = |hides_unread| {
+        let rows = |counts_rows| {
             let options = ViewOptions {
                 mode: crate::view::Mode::Nodes,
                 is_picture: true,
                 is_bundled: true,
-                hides_unread,
+                counts_rows,
                 ..ViewOptions::default()
             };
             let windows = ["/a>/t@5 /b</t /a>/scan@9 /c>/log@1 /c>/never"; 2];
@@ -381,10 +393,14 @@ mod tests {
             let view = view(&mission, &options).0;
             let rows = view.rows.iter();
             let rows = rows.map(|row| format!("{} {}", view.items[row.owner].name, row.item.name));
-            rows.collect::<Vec<_>>()
+            let counted = view.items.iter().flat_map(|item| {
+                let names = item.counted.iter();
+                names.map(|name| format!("{} +1 {name}", item.name))
+            });
+            rows.chain(counted).collect::<Vec<_>>()
         };
         assert_eq!(rows(false), ["/a /scan", "/c /log"]);
-        assert!(rows(true).is_empty());
+        assert_eq!(rows(true), ["/a +1 /scan", "/c +1 /log"]);
     }
 
     #[test]

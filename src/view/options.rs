@@ -201,8 +201,10 @@ pub struct ViewOptions {
     pub(crate) is_still: Option<bool>,
     /// The phases in which nodes of one namespace must be alike to share a box; none if each has its own.
     pub(crate) alike_in: Vec<Span>,
-    /// Whether bundles leave out topics that only one node is connected to, unless there is an event about them.
-    pub(crate) hides_unread: bool,
+    /// Whether bundles count the topics that a single node sends beside its name, unless there is an event about them.
+    pub(crate) counts_rows: bool,
+    /// Whether bundles list nodes without a line as words although they change or send, if their topics are counted.
+    pub(crate) are_unlinked_in_words: bool,
     /// Whether bundles also list nodes that never change as words if they have a single line.
     pub(crate) are_leaves_in_words: bool,
     /// Whether anonymous nodes are drawn under their full names, with a box for each run.

@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 use std::collections::BTreeSet;
 
 use super::boxes::Boxes;
-use super::measured::LINE;
+use super::measured::{LINE, counting};
 use super::options;
 use super::texts;
 use crate::base::geometry::{Point, Rect, Size};
@@ -44,7 +44,8 @@ pub(crate) fn footers(view: &View, style: &Style, fonts: &Fonts) -> Vec<Footer> 
             let rest = rest.and_then(|rest| rest.strip_prefix('/'));
             fonts.shown(rest.unwrap_or(name)).into_owned()
         };
-        let names: Vec<String> = also.items.iter().map(|item| short(&item.label)).collect();
+        let short = |item: &Item| counting(short(&item.label), item);
+        let names: Vec<String> = also.items.iter().map(short).collect();
         let size = style.edge.size;
         let all = names.iter().zip(&also.items).zip(&also.shown);
         let long = |text: &String| text.chars().count();

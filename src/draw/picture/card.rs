@@ -1,5 +1,7 @@
 //! Cards: boxes of nodes with a row for each topic without any other known publisher or subscriber.
 
+use std::collections::BTreeSet;
+
 use super::badge;
 use super::boxes::{Boxes, ItemBox, class, data, title};
 use super::item_id;
@@ -7,6 +9,7 @@ use super::measured::{ShownRates, second_line, short_name};
 use super::options::{self, BoxLook};
 use super::topics::{called, fitted};
 use crate::base::geometry::{Point, Rect, Size};
+use crate::base::name::namespace;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Text};
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
@@ -20,6 +23,8 @@ const STEP: f64 = 1.5;
 const PAD: f64 = 1.1;
 /// The most names in a row of topics without messages.
 const MOST_SILENT: usize = 3;
+/// The most rows of a box of which few are listed; of more, the last counts those that are not.
+const MOST_ROWS: usize = 3;
 /// The size of a badge in a row, relative to that on a box.
 const BADGE: f64 = 0.7;
 
@@ -36,6 +41,7 @@ pub(crate) struct Card {
 /// One row: a topic, or several that never carry a message or are hubs.
 #[derive(Clone, Debug, PartialEq)]
 struct Line {
+    /// How its topics are connected; none if they are only counted.
     sign: &'static str,
     /// The indices of the topics in the view's rows, with their names as drawn.
     topics: Vec<(usize, String)>,
@@ -68,6 +74,9 @@ pub(crate) fn cards(view: &View, style: &Style, fonts: &Fonts) -> Vec<Card> {
         }
     }
     for card in cards.iter_mut().filter(|card| !card.lines.is_empty()) {
+        if view.lists_few {
+            card.shorten(view);
+        }
         let wide = card.lines.iter().map(|line| line.width(view, style, fonts));
         card.room = Size::new(
             wide.fold(0.0, f64::max),
@@ -77,18 +86,54 @@ pub(crate) fn cards(view: &View, style: &Style, fonts: &Fonts) -> Vec<Card> {
     cards
 }
 
-/// Whether a topic has no events and either never carries a message or is a hub.
-fn is_quiet(row: &CardRow) -> bool {
-    row.shown.distinct().iter().all(|look| {
-        let is_silent = look.state != State::Latched && look.hz.unwrap_or(0.0) <= 0.0;
-        look.mark.is_none() && (is_silent || row.is_infrastructure)
-    })
+impl Card {
+    /// Counts all but two rows if there are more than [`MOST_ROWS`], besides those that change: the rarest first.
+    fn shorten(&mut self, view: &View) {
+        if self.lines.len() <= MOST_ROWS {
+            return;
+        }
+        let weight = |line: &Line| {
+            let rows = line.topics.iter().map(|(at, _)| &view.rows[*at]);
+            let rates = rows.clone().flat_map(|row| row.shown.distinct());
+            let rate = rates.filter_map(|look| look.hz).fold(0.0, f64::max);
+            (rows.clone().any(is_changing), rate)
+        };
+        let mut order: Vec<(bool, f64, usize)> = Vec::new();
+        for (at, line) in self.lines.iter().enumerate() {
+            let (changes, rate) = weight(line);
+            order.push((changes, rate, at));
+        }
+        order.sort_by(|a, b| b.0.cmp(&a.0).then(b.1.total_cmp(&a.1)).then(a.2.cmp(&b.2)));
+        let changing = order.iter().filter(|(changes, ..)| *changes).count();
+        let listed = order.iter().take(changing.max(MOST_ROWS - 1));
+        let listed: BTreeSet<usize> = listed.map(|(.., at)| *at).collect();
+        let mut at = 0..;
+        let (stay, rest): (Vec<Line>, Vec<Line>) = std::mem::take(&mut self.lines)
+            .into_iter()
+            .partition(|_| at.next().is_some_and(|at| listed.contains(&at)));
+        self.lines = stay;
+        let topics: Vec<_> = rest.into_iter().flat_map(|line| line.topics).collect();
+        if !topics.is_empty() {
+            self.lines.push(Line { sign: "", topics });
+        }
+    }
 }
 
-/// The name of a topic as drawn: relative to the frame around the node.
+/// Whether there is an event about a topic or its connection.
+fn is_changing(row: &CardRow) -> bool {
+    row.shown.distinct().iter().any(|look| look.mark.is_some())
+}
+
+/// Whether a topic has no events and either never carries a message or is a hub.
+fn is_quiet(row: &CardRow) -> bool {
+    let is_silent = |look: &Shown| look.state != State::Latched && look.hz.unwrap_or(0.0) <= 0.0;
+    let mut looks = row.shown.distinct().iter();
+    !is_changing(row) && looks.all(|look| is_silent(look) || row.is_infrastructure)
+}
+
+/// The name of a topic as drawn: relative to the namespace of the node.
 fn name(view: &View, row: &CardRow, fonts: &Fonts, size: f64) -> String {
-    let space = view.items[row.owner].cluster;
-    let inside = space.map_or("", |at| &*view.namespaces[at].name);
+    let inside = namespace(&view.items[row.owner].name).trim_end_matches('/');
     let name = fitted(short_name(&row.item.label, inside), fonts, size);
     if row.item.is_service {
         called(&name)
@@ -115,6 +160,9 @@ impl Line {
     fn words(&self, is_there: impl Fn(usize) -> bool) -> String {
         let names = self.topics.iter().filter(|(at, _)| is_there(*at));
         let names: Vec<&str> = names.map(|(_, name)| name.as_str()).collect();
+        if self.sign.is_empty() {
+            return format!("+{}", names.len());
+        }
         let (first, rest) = names.split_at(names.len().min(MOST_SILENT));
         let rest = match rest.len() {
             0 => String::new(),

@@ -199,6 +199,14 @@ impl MeasuredGraph {
     }
 }
 
+/// A name with the number of topics that are only counted: `imu_driver +2`.
+pub(crate) fn counting(name: String, item: &Item) -> String {
+    match item.counted.len() {
+        0 => name,
+        more => format!("{name} +{more}"),
+    }
+}
+
 /// The outline of a box: rows need straight sides.
 fn outline(item: &Item, has_rows: bool, style: &Style) -> Outline {
     match item.kind {
@@ -260,7 +268,7 @@ impl Measurer<'_> {
             others.push(format!("+{} more", item.others.len() - named));
         }
         Label {
-            name: fit(&name, body.weight()),
+            name: counting(fit(&name, body.weight()), item),
             others,
             second,
             has_bar: false,

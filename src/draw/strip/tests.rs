@@ -34,6 +34,7 @@ fn two_nodes() -> (Mission, View) {
         label: Arc::from(name),
         others: Vec::new(),
         members: vec![Element::Node(NodeId(id))],
+        counted: Vec::new(),
         is_replica: false,
         is_service: false,
         cluster: None,

@@ -48,6 +48,11 @@ pub(crate) fn routes(plan: &Plan, boxes: &[Rect]) -> (Vec<Route>, usize) {
     (routes, straight)
 }
 
+/// The distance from a box of a lane that an edge turns into: the length of an arrow's head, and half the space between
+/// boxes without lines.
+const LANE: f64 = 10.0;
+/// The difference below which two positions across are the same, in pixels.
+const SAME: f64 = 0.05;
 /// The radius at which an edge with given points turns.
 const BEND: f64 = 9.0;
 
@@ -89,6 +94,38 @@ fn towards(corner: Point, other: Point) -> Point {
 
 fn straight(p: Point, q: Point) -> [Point; 3] {
     [p.towards(q, 1.0 / 3.0), p.towards(q, 2.0 / 3.0), q]
+}
+
+impl Route {
+    /// The route with its first level piece at another height. A label beside that piece is left to be placed again.
+    fn raised(&self, y: f64) -> Self {
+        let old = self.start.y;
+        let mut raised = self.clone();
+        raised.start.y = y;
+        // The end stays where it is.
+        let movable = (3 * self.curves.len()).saturating_sub(1);
+        let points = raised.curves.iter_mut().flatten().take(movable);
+        let mut reach = self.start.x;
+        for point in points.take_while(|p| (p.y - old).abs() < SAME) {
+            point.y = y;
+            reach = point.x;
+        }
+        let (low, high) = (reach.min(self.start.x), reach.max(self.start.x));
+        let is_beside = |label: &Point| (low..=high).contains(&label.x);
+        raised.label = self
+            .label
+            .filter(|label| (y - old).abs() < SAME || !is_beside(label));
+        raised
+    }
+
+    /// The route with straight pieces along these points before it, and round corners between them.
+    fn along(&self, points: &[Point]) -> Self {
+        let way: Vec<Point> = points.iter().copied().chain([self.start]).collect();
+        let mut led = rounded(&way);
+        led.curves.extend(&self.curves);
+        led.label = self.label;
+        led
+    }
 }
 
 /// A vertex with its position.
@@ -232,6 +269,33 @@ impl Map {
         way[0] = leaves(&from.rect, from.outline, way[0], way[1]);
         way[many - 1] = leaves(&to.rect, to.outline, way[many - 1], way[many - 2]);
         Some(rounded(&way))
+    }
+
+    /// A route that starts at the frame around a box, led on to the box itself, and whether it is level there, `aside`
+    /// of its middle: if something is in the way, it turns into the nearest free lane, else around corners. `None` if
+    /// it is blocked.
+    pub(crate) fn led_on(&mut self, route: &Route, end: End, aside: f64) -> Option<(Route, bool)> {
+        let (middle, from) = (end.rect.centre(), route.start);
+        let own = (end.at, end.at);
+        let level = Point::new(middle.x, middle.y + aside);
+        if self.clear(level, Point::new(from.x, level.y), own) {
+            let start = leaves(&end.rect, end.outline, level, Point::new(from.x, level.y));
+            return Some((route.raised(level.y).along(&[start]), true));
+        }
+        let foot = Point::new(middle.x + aside, middle.y);
+        let sides = [end.rect.y - LANE, end.rect.bottom() + LANE];
+        let mut lanes = sides.map(|y| Point::new(foot.x, y));
+        lanes.sort_by(|a, b| (a.y - from.y).abs().total_cmp(&(b.y - from.y).abs()));
+        for lane in lanes {
+            if self.clear(lane, Point::new(from.x, lane.y), own) && self.clear(foot, lane, own) {
+                let start = leaves(&end.rect, end.outline, foot, lane);
+                return Some((route.raised(lane.y).along(&[start, lane]), false));
+            }
+        }
+        let mut way = self.way(middle, from, own)?;
+        way[0] = leaves(&end.rect, end.outline, way[0], way[1]);
+        way.pop();
+        Some((route.along(&way), false))
     }
 
     /// The path from a box to a point of a level lane. If it has to turn, it meets the lane vertically from

@@ -396,6 +396,7 @@ mod tests {
             label: Arc::from(*name),
             others: Vec::new(),
             members: Vec::new(),
+            counted: Vec::new(),
             is_replica: false,
             is_service: false,
             cluster: None,

@@ -1,0 +1,262 @@
+//! A part as blocks: the contents of each outermost namespace are laid out by themselves, then the namespaces as boxes.
+//!
+//! Layers that run through all namespaces spread each over as many columns as lie between its first box and its last; a
+//! block is as compact as its own contents allow.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rayon::prelude::*;
+
+use super::subplan::Subplan;
+use super::{Draft, PlacedPart};
+use crate::base::geometry::{Point, Rect, Size, polyline};
+use crate::layout::routes::around::{End, Map};
+use crate::layout::spacing::PADDING;
+use crate::layout::{
+    Component, Layout, LayoutOptions, Link, Orientation, Outline, Plan, Route, Vertex,
+};
+
+/// The shapes, width over height, of the pages on which the contents of namespaces are laid out: columns, squares, rows.
+const SHAPES: [f64; 3] = [0.3, 1.0, 3.0];
+/// The distance of lines that leave a box of a block on the same side, and the share of the side that they may take: as
+/// far apart as the heads of arrows must be to be told apart.
+const PORT_STEP: f64 = 9.0;
+const PORTS: f64 = 0.6;
+/// The straight pieces that stand for each curve of a route when crossings are counted.
+const PIECES: u32 = 3;
+
+/// The part with its outermost namespaces as blocks, in the way that is judged best, and its quality: with all contents
+/// on pages of one shape, and for a drawing that fills the page, each in its own. `None` if it has fewer than two
+/// namespaces, or something is too large.
+pub(crate) fn best(
+    plan: &Plan,
+    options: &LayoutOptions,
+    part: &Component,
+    orientation: Orientation,
+    quality: impl Fn(&PlacedPart) -> f64,
+) -> Option<(f64, PlacedPart)> {
+    let blocks = Blocks::new(plan, options, part, orientation)?;
+    let judged = |shapes: Vec<usize>| {
+        let placed = blocks.placed(&shapes)?;
+        Some((quality(&placed), placed, shapes))
+    };
+    let better = |best: (f64, PlacedPart, Vec<usize>), next: (f64, PlacedPart, Vec<usize>)| {
+        if next.0 > best.0 { next } else { best }
+    };
+    let many = blocks.contents.len();
+    let equal = (0..SHAPES.len()).map(|shape| vec![shape; many]);
+    let mut best = equal.filter_map(judged).reduce(better)?;
+    for at in (0..many).filter(|_| options.is_tight) {
+        for shape in 0..SHAPES.len() {
+            let mut shapes = best.2.clone();
+            if blocks.contents[at][shape].1.size != blocks.contents[at][shapes[at]].1.size {
+                shapes[at] = shape;
+                best = judged(shapes).into_iter().fold(best, better);
+            }
+        }
+    }
+    Some((best.0, best.1))
+}
+
+/// A part with the contents of its outermost namespaces laid out in each shape.
+struct Blocks<'a> {
+    plan: &'a Plan,
+    options: &'a LayoutOptions,
+    part: &'a Component,
+    orientation: Orientation,
+    cut: Cut,
+    /// The contents of each namespace, with their layout in each shape.
+    contents: Vec<Vec<(Subplan, Layout)>>,
+}
+
+impl<'a> Blocks<'a> {
+    fn new(
+        plan: &'a Plan,
+        options: &'a LayoutOptions,
+        part: &'a Component,
+        orientation: Orientation,
+    ) -> Option<Self> {
+        let cut = Cut::new(part)?;
+        let laid_out = |space: usize, shape: f64| {
+            let page = Size::new(options.page.h * shape, options.page.h);
+            let options = LayoutOptions { page, ..*options };
+            let sub = Subplan::new(plan, part, space, |v| cut.space[v] == space);
+            let draft = Draft::new(&sub.plan, &options)?;
+            let (_, layout) = draft.assembled(&sub.plan, &options, orientation);
+            Some((sub, layout))
+        };
+        let spaces = cut.spaces.par_iter();
+        let contents = spaces.map(|space| {
+            SHAPES
+                .iter()
+                .map(|shape| laid_out(*space, *shape))
+                .collect()
+        });
+        let contents: Option<Vec<Vec<(Subplan, Layout)>>> = contents.collect();
+        Some(Self {
+            contents: contents?,
+            plan,
+            options,
+            part,
+            orientation,
+            cut,
+        })
+    }
+
+    /// The part with the contents of each namespace in one of the shapes; `None` if a route is blocked.
+    fn placed(&self, shapes: &[usize]) -> Option<PlacedPart> {
+        let (plan, part, cut) = (self.plan, self.part, &self.cut);
+        let chosen = self.contents.iter().zip(shapes);
+        let chosen: Vec<&(Subplan, Layout)> = chosen.map(|(all, shape)| &all[*shape]).collect();
+        let frames = chosen.iter().zip(&cut.spaces).map(|((_, layout), space)| {
+            let inside = Rect::new(0.0, 0.0, layout.size.w, layout.size.h);
+            plan.clusters[part.clusters[space - 1]].frame(inside, PADDING)
+        });
+        let frames: Vec<Rect> = frames.collect();
+        let outer = cut.plan(plan, part, &frames);
+        let draft = Draft::new(&outer, self.options)?;
+        let (_, layout) = draft.assembled(&outer, self.options, self.orientation);
+        let mut placed = PlacedPart::unplaced(part);
+        let (places, free) = layout.boxes.split_at(frames.len());
+        for (at, place) in places.iter().enumerate() {
+            let by = Point::new(place.x - frames[at].x, place.y - frames[at].y);
+            chosen[at].0.put(&chosen[at].1, by, &mut placed);
+            placed.clusters[cut.spaces[at] - 1] = *place;
+        }
+        for (&v, at) in cut.free.iter().zip(free) {
+            placed.boxes[v] = *at;
+        }
+        for (&link, route) in cut.between.iter().zip(layout.routes) {
+            placed.routes[link] = route;
+        }
+        // The way between along and across and the page is the same in both directions.
+        let mut placed = placed.on_page(self.orientation);
+        placed.crossings = cut.connect(plan, part, &mut placed)? + crossings(&placed.routes);
+        Some(placed.on_page(self.orientation))
+    }
+}
+
+/// A part cut into its outermost namespaces; all indices refer to the part.
+struct Cut {
+    /// The outermost namespace of each vertex; 0 if it is in none.
+    space: Vec<usize>,
+    /// These namespaces.
+    spaces: Vec<usize>,
+    /// The vertices in none.
+    free: Vec<usize>,
+    /// The links that leave a namespace, or join vertices in none.
+    between: Vec<usize>,
+}
+
+impl Cut {
+    fn new(part: &Component) -> Option<Self> {
+        let outermost = |home: &usize| part.around(*home).last().unwrap_or(0);
+        let space: Vec<usize> = part.home.iter().map(outermost).collect();
+        let spaces: BTreeSet<usize> = space.iter().copied().filter(|space| *space != 0).collect();
+        let is_between = |link: &usize| {
+            let (from, to) = part.ends[*link];
+            space[from] == 0 || space[from] != space[to]
+        };
+        let between = (0..part.ends.len()).filter(is_between).collect();
+        (spaces.len() > 1).then(|| Self {
+            spaces: spaces.into_iter().collect(),
+            free: (0..space.len()).filter(|v| space[*v] == 0).collect(),
+            between,
+            space,
+        })
+    }
+
+    /// The plan with a box for each namespace, with these frames, then one for each vertex in none.
+    fn plan(&self, plan: &Plan, part: &Component, frames: &[Rect]) -> Plan {
+        let block = |frame: &Rect| Vertex {
+            size: Size::new(frame.w, frame.h),
+            outline: Outline::Box,
+            cluster: None,
+        };
+        let free = self
+            .free
+            .iter()
+            .map(|v| plan.vertices[part.vertices[*v]].clone());
+        let of = |v: usize| {
+            let block = self.spaces.binary_search(&self.space[v]);
+            let free = |_| self.spaces.len() + self.free.partition_point(|other| *other < v);
+            block.unwrap_or_else(free)
+        };
+        let link = |link: &usize| Link {
+            from: of(part.ends[*link].0),
+            to: of(part.ends[*link].1),
+            ..plan.links[part.links[*link]]
+        };
+        Plan {
+            vertices: frames.iter().map(block).chain(free).collect(),
+            links: self.between.iter().map(link).collect(),
+            clusters: Vec::new(),
+            is_labelled: plan.is_labelled,
+        }
+    }
+
+    /// Leads the routes between the blocks on to the boxes inside, x along the edges and y across. Returns how many turn
+    /// there, which costs a reader as much as a crossing; `None` if one is blocked.
+    fn connect(&self, plan: &Plan, part: &Component, placed: &mut PlacedPart) -> Option<u64> {
+        let mut turns = 0;
+        let mut map = Map::new(&placed.boxes);
+        for is_end in [true, false] {
+            let mut sides: BTreeMap<(usize, bool), Vec<usize>> = BTreeMap::new();
+            for &link in &self.between {
+                let (from, to) = part.ends[link];
+                let v = if is_end { to } else { from };
+                placed.routes[link] = placed.routes[link].backwards();
+                if self.space[v] != 0 {
+                    let is_after = placed.routes[link].start.x > placed.boxes[v].centre().x;
+                    sides.entry((v, is_after)).or_default().push(link);
+                }
+            }
+            for ((v, _), mut links) in sides {
+                let y = |link: &usize| placed.routes[*link].start.y;
+                links.sort_by(|a, b| y(a).total_cmp(&y(b)).then(a.cmp(b)));
+                let end = End {
+                    at: v,
+                    rect: placed.boxes[v],
+                    outline: plan.vertices[part.vertices[v]].outline,
+                };
+                let many = links.len() as f64;
+                let step = PORT_STEP.min(PORTS * end.rect.h / many);
+                for (nth, link) in links.into_iter().enumerate() {
+                    let aside = (nth as f64 - (many - 1.0) / 2.0) * step;
+                    let (route, is_level) = map.led_on(&placed.routes[link], end, aside)?;
+                    placed.routes[link] = route;
+                    turns += u64::from(!is_level);
+                }
+            }
+        }
+        Some(turns)
+    }
+}
+
+/// The number of points at which routes cross each other.
+fn crossings(routes: &[Route]) -> u64 {
+    let line = |route: &Route| {
+        let points = polyline(route.start, &route.curves, PIECES);
+        let bounds = Rect::of_points(points.iter().copied()).unwrap_or_default();
+        (points, bounds)
+    };
+    let lines: Vec<(Vec<Point>, Rect)> = routes.iter().map(line).collect();
+    let mut crossings = 0;
+    for (at, (line, bounds)) in lines.iter().enumerate() {
+        for (other, _) in lines[at + 1..].iter().filter(|(_, b)| b.overlaps(bounds)) {
+            for piece in line.windows(2) {
+                let crossed = other
+                    .windows(2)
+                    .filter(|o| crosses([piece[0], piece[1]], [o[0], o[1]]));
+                crossings += crossed.count() as u64;
+            }
+        }
+    }
+    crossings
+}
+
+/// Whether two straight pieces cross.
+fn crosses([a, b]: [Point; 2], [c, d]: [Point; 2]) -> bool {
+    let side = |p: Point, q: Point, r: Point| (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x);
+    side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
+}
