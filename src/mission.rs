@@ -7,6 +7,7 @@
 pub mod event_log;
 pub mod info;
 pub mod phases;
+pub(crate) mod rates;
 
 mod joined;
 mod json;

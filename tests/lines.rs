@@ -121,11 +121,13 @@ fn hubs_have_no_lines_and_nodes_without_lines_are_text() {
             .collect();
         let boxes = groups(picture, "node");
         let boxes: Vec<&str> = boxes.iter().map(|(a, _)| a["data-name"].as_str()).collect();
-        assert!(names.contains(&"/robot1/imu_driver"), "{names:?}");
+        assert!(names.contains(&"/robot1/camera_tf"), "{names:?}");
         assert!(names.iter().all(|name| !boxes.contains(name)));
         let words: Vec<&String> = also.iter().flat_map(|(_, words)| words).collect();
         assert!(
-            words.iter().any(|word| word.starts_with("imu_driver")),
+            words
+                .iter()
+                .any(|word| word.starts_with("lifecycle_manager")),
             "{words:?}"
         );
     }

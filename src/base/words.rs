@@ -71,6 +71,24 @@ pub fn rate_change(from_hz: f64, to_hz: f64) -> String {
     }
 }
 
+/// The most rates in a row of them.
+const MOST_RATES: usize = 4;
+
+/// Rates one after the other: `10 → 5 → 10 Hz`; of more than four, the first two, the last, and `…` for the others.
+pub fn rates(all_hz: &[f64]) -> String {
+    let split: Vec<(String, &str)> = all_hz.iter().map(|hz| split_rate(*hz)).collect();
+    let unit = split.last().map_or("", |last| last.1);
+    let one = |(value, own): &(String, &str)| match *own == unit {
+        true => value.clone(),
+        false => format!("{value} {own}"),
+    };
+    let mut parts: Vec<String> = split.iter().map(one).collect();
+    if parts.len() > MOST_RATES {
+        parts.splice(2..parts.len() - 1, ["…".to_owned()]);
+    }
+    format!("{} {unit}", parts.join(" → "))
+}
+
 /// A range of rates: `13.5–16.5 Hz`, `at least 5 Hz`.
 pub fn rate_range(from_hz: Option<f64>, to_hz: Option<f64>) -> String {
     match (from_hz, to_hz) {

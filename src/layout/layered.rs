@@ -60,7 +60,8 @@ pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
     let tried = |orientation| {
         let (crossings, mut layout) = draft.assembled(plan, options, orientation);
         let length = layout.routes.iter().map(Route::length).sum();
-        let quality = quality(layout.size, (crossings, length), plan.links.len(), options);
+        let quality = quality(layout.size, (crossings, length), plan.links.len(), options)
+            * use_of(pack::fit(layout.size, options.page), options);
         labels::place(plan, &mut layout);
         (quality * (0.6 + 0.4 * labelled(plan, &layout)), layout)
     };
@@ -315,11 +316,8 @@ fn quality(
 ) -> f64 {
     let links = links.max(1) as f64;
     let fit = pack::fit(size, options.page);
-    // A drawing of no use is worse than its size alone says.
-    let useless = (options.least / fit).clamp(1.0, MOST_USELESS);
-    let fit = fit / (useless * useless);
     if options.is_tight {
-        return fit / (1.0 + TIGHT_CROSSING * crossings as f64 / links);
+        return fit * use_of(fit, options) / (1.0 + TIGHT_CROSSING * crossings as f64 / links);
     }
     let small = (options.page.w * options.page.h / (size.w * size.h).max(1.0)).sqrt();
     let readable = libm::pow(fit, 0.8) * libm::pow(small, 0.2);
@@ -329,6 +327,12 @@ fn quality(
 
 /// The share of the smallest useful scale below which all drawings are equally useless: a sketch has no useful scale.
 const MOST_USELESS: f64 = 4.0;
+
+/// The use of a drawing at this scale, 1 unless it is too small: it is then worse than its size alone says.
+fn use_of(fit: f64, options: &LayoutOptions) -> f64 {
+    let useless = (options.least / fit).clamp(1.0, MOST_USELESS);
+    1.0 / (useless * useless)
+}
 
 /// The largest rounding error in the quality of a drawing.
 const ROUNDING: f64 = 1.0 + 1e-9;

@@ -100,6 +100,8 @@ pub struct Shown {
     pub held: Option<(f64, Option<u64>)>,
     /// Messages per second before and after, if `mark` is `Faster` or `Slower`.
     pub rates: Option<(f64, f64)>,
+    /// The rates of a still in order, in messages per second, if there are several.
+    pub steps: Vec<f64>,
     /// Whether it is silent or away during the whole window, with a beginning and an end in the event log, or
     /// before its first message.
     pub is_paused: bool,
@@ -249,6 +251,8 @@ pub struct TopicRow {
     pub mark: Option<Mark>,
     /// Messages per second before and after, if its rate changed.
     pub rates: Option<(f64, f64)>,
+    /// The rates of a still in order, in messages per second, if there are several.
+    pub steps: Vec<f64>,
 }
 
 /// The properties that distinguish unmarked topics of a bundle.
@@ -267,6 +271,7 @@ impl TopicRow {
             count: shown.count,
             mark: None,
             rates: None,
+            steps: Vec::new(),
         }
     }
 

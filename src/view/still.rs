@@ -8,13 +8,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::steady::Lengths;
 use super::{
-    Counts, Frame, Item, ItemId, Looks, Mark, Phrase, SeenWindow, Shown, TopicRow, View,
-    sum as added,
+    Arrow, ArrowKind, Counts, Frame, Item, ItemId, Looks, Mark, Phrase, SeenWindow, Shown,
+    TopicRow, View, sum as added,
 };
 use crate::base::time::Span;
 use crate::base::words;
+use crate::graph::history::Sender;
 use crate::graph::{ById, Element};
 use crate::mission::event_log::Kind;
+use crate::mission::rates::{Rates, mean};
 use crate::mission::{EventId, Mission};
 
 /// The times at which a box of a still was there.
@@ -29,12 +31,30 @@ pub struct Presence {
 /// All windows of a view as one.
 pub(super) fn still(mut view: View, mission: &Mission) -> View {
     let lengths = Lengths::new(view.frames.iter().map(|f| f.span));
-    let rows = view.rows.iter_mut().map(|row| &mut row.shown);
-    let also = view.also.iter_mut().flat_map(|also| &mut also.shown);
-    let items = view.items_shown.iter_mut();
-    let boxes = items.chain(view.arrows_shown.iter_mut());
-    for looks in rows.chain(also).chain(boxes) {
-        *looks = Looks::of([whole(looks, &lengths).as_ref()]);
+    let rates = StillRates(Rates::new(mission));
+    for row in &mut view.rows {
+        let shown = whole(&row.shown, &lengths).map(|shown| match row.is_infrastructure {
+            true => shown,
+            false => rates.of_topics(&row.item.members, shown),
+        });
+        row.shown = Looks::of([shown.as_ref()]);
+    }
+    let also = view.also.iter_mut();
+    let also = also.flat_map(|also| also.items.iter().zip(&mut also.shown));
+    for (item, looks) in view
+        .items
+        .iter()
+        .zip(view.items_shown.iter_mut())
+        .chain(also)
+    {
+        let shown = whole(looks, &lengths);
+        let shown = shown.map(|shown| rates.of_topics(&item.members, shown));
+        *looks = Looks::of([shown.as_ref()]);
+    }
+    for (arrow, looks) in view.arrows.iter().zip(view.arrows_shown.iter_mut()) {
+        let shown = whole(looks, &lengths);
+        let shown = shown.map(|shown| rates.of_line(arrow, shown));
+        *looks = Looks::of([shown.as_ref()]);
     }
     let marks = marks(mission);
     let items = view.items.iter();
@@ -74,6 +94,58 @@ pub(crate) fn union(view: &View) -> Option<SeenWindow> {
         items: all(&view.items_shown),
         arrows: all(&view.arrows_shown),
     })
+}
+
+/// The rates of a still: while a topic was sent, and their steps.
+struct StillRates<'a>(Rates<'a>);
+
+impl StillRates<'_> {
+    /// The mean rate of some senders together while they send, and the rates in order if there are several.
+    fn rate(&self, senders: &[&Sender]) -> Option<(f64, Vec<f64>)> {
+        let pieces = self.0.of(senders);
+        let mut steps: Vec<f64> = pieces.iter().map(|piece| piece.hz).collect();
+        steps.dedup_by(|a, b| words::rate(*a) == words::rate(*b));
+        steps.truncate(if steps.len() > 1 { steps.len() } else { 0 });
+        Some((mean(&pieces)?, steps))
+    }
+
+    /// The look of a box or row of a single topic, with its rates.
+    fn of_topics(&self, members: &[Element], shown: Shown) -> Shown {
+        let [Element::Topic(topic)] = members else {
+            return shown;
+        };
+        let senders: Vec<&Sender> = self.0.of_topic(*topic);
+        match self.rate(&senders) {
+            Some((hz, steps)) => Shown {
+                hz: Some(hz),
+                steps,
+                ..shown
+            },
+            None => shown,
+        }
+    }
+
+    /// The look of a line, with the rates of each topic on it.
+    fn of_line(&self, arrow: &Arrow, mut shown: Shown) -> Shown {
+        for row in &mut shown.topics {
+            let name = arrow.topics.get(row.topic as usize);
+            let edges = self
+                .0
+                .publications(&arrow.members, name.map(|name| &**name));
+            if let Some((hz, steps)) = self.rate(&self.0.senders(&edges)) {
+                (row.hz, row.steps) = (Some(hz), steps);
+            }
+        }
+        if arrow.kind == ArrowKind::Publish {
+            let edges = self.0.publications(&arrow.members, None);
+            if let [_] = edges[..]
+                && let Some((hz, steps)) = self.rate(&self.0.senders(&edges))
+            {
+                (shown.hz, shown.steps) = (Some(hz), steps);
+            }
+        }
+        shown
+    }
 }
 
 /// The look of one item or arrow in all windows together.

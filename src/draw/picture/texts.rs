@@ -1,6 +1,6 @@
 //! The words on the picture: badges with counts, and facts about an element.
 
-use crate::base::words::{count, rate, rate_change, rate_of};
+use crate::base::words::{count, rate, rate_change, rate_of, rates};
 use crate::view::{Counts, Shown};
 
 /// The texts of the badges for beginnings, ends and other changes, each with the number of headlines it
@@ -69,6 +69,9 @@ pub(crate) fn inside(counts: &Counts) -> String {
 
 /// The rate that is written, with no more digits than its number of messages justifies; `None` for none.
 pub(crate) fn rate_in(shown: &Shown) -> Option<String> {
+    if shown.steps.len() > 1 && shown.each < 2 {
+        return Some(rates(&shown.steps));
+    }
     let (hz, count) = shown.written_rate();
     measured(shown, hz, count)
 }

@@ -188,6 +188,9 @@ fn rate(row: &TopicRow) -> Option<String> {
     if let Some((before, now)) = row.rates {
         return Some(words::rate_change(before, now));
     }
+    if row.steps.len() > 1 && row.ways != [true, true] {
+        return Some(words::rates(&row.steps));
+    }
     if row.is_starved {
         return Some(STARVED.to_owned());
     }

@@ -1,7 +1,7 @@
 //! A row per node or topic: the times at which it existed and published, and its rates. Lifetimes and rates are
 //! those of the mission's history; the height of a bar only changes where the log has another rate.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::marks::{RowMark, marked};
@@ -9,16 +9,9 @@ use super::source::FigureSource;
 use crate::base::name::namespace;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Confidence;
-use crate::graph::history::{Sender, Stretch};
+use crate::graph::history::Sender;
 use crate::graph::{ById, EdgeId, Element, NodeId, TopicId};
-use crate::mission::event_log::Kind;
-
-/// The length above which a silence visibly interrupts a bar: in nanoseconds, and as a fraction of the
-/// mission (one in so many).
-const SILENCE: (i64, i64) = (4_000_000_000, 83);
-/// The shortest visible piece of a bar, as a fraction of the mission (one in so many). Shorter ones join the
-/// previous one.
-const SEEN: i64 = 400;
+use crate::mission::rates::{Piece, Rates, mean, silence};
 
 /// An interval of publishing at one rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -108,7 +101,7 @@ pub(crate) fn of(source: &FigureSource<'_>, by_topics: bool) -> Vec<Row> {
 
 /// A row per role, with its events.
 pub(crate) fn of_nodes(source: &FigureSource<'_>) -> Vec<Row> {
-    let (steps, elements) = (Steps::new(source), &source.mission.elements);
+    let (rates, elements) = (Rates::new(source.mission), &source.mission.elements);
     let mut received = ById::like(&elements.nodes, BTreeSet::new());
     for edge in &elements.subscribes {
         if source.shows(edge.topic) && !source.is_hub(edge.topic) {
@@ -118,7 +111,7 @@ pub(crate) fn of_nodes(source: &FigureSource<'_>) -> Vec<Row> {
     let row = |(role, nodes): (&Arc<str>, &Vec<NodeId>)| {
         let publications = source.publications(nodes);
         let elements: Vec<Element> = nodes.iter().map(|id| Element::Node(*id)).collect();
-        let own = row(source, &steps, &elements, &source.senders(&publications));
+        let own = row(source, &rates, &elements, &rates.senders(&publications));
         Row {
             name: Arc::clone(role),
             nodes: nodes.clone(),
@@ -126,7 +119,7 @@ pub(crate) fn of_nodes(source: &FigureSource<'_>) -> Vec<Row> {
                 arrowed(
                     "→",
                     role,
-                    sent_by(source, &steps, &publications).into_iter(),
+                    sent_by(source, &rates, &publications).into_iter(),
                 ),
                 arrowed("←", role, nodes.iter().flat_map(|id| received[*id].clone())),
             ],
@@ -139,7 +132,7 @@ pub(crate) fn of_nodes(source: &FigureSource<'_>) -> Vec<Row> {
 
 /// A row per topic that carried a message, with its events.
 pub(crate) fn of_topics(source: &FigureSource<'_>) -> Vec<Row> {
-    let steps = Steps::new(source);
+    let rates = Rates::new(source.mission);
     let row = |id: TopicId| {
         let senders: Vec<&Sender> = source.mission.sending.of_topic(id).iter().collect();
         let topic = source.mission.elements.topics.get(id);
@@ -148,7 +141,7 @@ pub(crate) fn of_topics(source: &FigureSource<'_>) -> Vec<Row> {
             name: source.topic(id).into(),
             topic: Some(id),
             beside: [Vec::new(), types.unwrap_or_default()],
-            ..row(source, &steps, &[Element::Topic(id)], &senders)
+            ..row(source, &rates, &[Element::Topic(id)], &senders)
         }
     };
     let rows = source.shown_topics().map(row);
@@ -157,15 +150,18 @@ pub(crate) fn of_topics(source: &FigureSource<'_>) -> Vec<Row> {
 }
 
 /// The row of some elements drawn as one, without its name.
-fn row(source: &FigureSource<'_>, steps: &Steps, elements: &[Element], senders: &[&Sender]) -> Row {
+fn row(
+    source: &FigureSource<'_>,
+    rates: &Rates<'_>,
+    elements: &[Element],
+    senders: &[&Sender],
+) -> Row {
     let whole = source.span();
     let lives = elements.iter().flat_map(|what| source.lives(*what));
     let lives = Span::joined(lives.collect(), 0);
     let confidence = elements.iter().map(|what| source.confidence(*what)).min();
-    let rates: Vec<Vec<Piece>> = senders.iter().map(|s| steps.pieces(s, whole)).collect();
-    let hz = rates.iter().filter_map(|pieces| mean(pieces));
-    let hz = hz.reduce(|a, b| a + b);
-    let pieces = summed(&rates, whole);
+    let pieces = rates.of(senders);
+    let hz = mean(&pieces);
     let most = pieces.iter().map(|piece| piece.hz).fold(0.0, f64::max);
     let share = |hz: f64| if most > 0.0 { hz / most } else { 1.0 };
     let bar = |piece: &Piece| SendingBar::new(piece.span, share(piece.hz));
@@ -187,13 +183,10 @@ fn row(source: &FigureSource<'_>, steps: &Steps, elements: &[Element], senders: 
 }
 
 /// The topics of some publications that tell something about their nodes, the fastest first.
-fn sent_by<'s>(source: &'s FigureSource<'_>, steps: &Steps, edges: &[EdgeId]) -> Vec<&'s str> {
+fn sent_by<'s>(source: &'s FigureSource<'_>, rates: &Rates<'_>, edges: &[EdgeId]) -> Vec<&'s str> {
     let rated = |edge: &EdgeId| {
         let topic = source.mission.elements.publishes.get(*edge)?.topic;
-        let senders = source.senders(&[*edge]);
-        let hz = senders
-            .first()
-            .and_then(|s| mean(&steps.pieces(s, source.span())));
+        let hz = mean(&rates.of(&rates.senders(&[*edge])));
         (!source.is_hub(topic)).then_some((hz.unwrap_or(0.0), source.topic(topic)))
     };
     let mut rated: Vec<(f64, &str)> = edges.iter().filter_map(rated).collect();
@@ -219,147 +212,4 @@ pub(crate) fn relative<'t>(topic: &'t str, node: &str) -> &'t str {
     let inside = topic.strip_prefix(namespace(node).trim_end_matches('/'));
     let inside = inside.and_then(|inside| inside.strip_prefix('/'));
     inside.unwrap_or_else(|| topic.strip_prefix('/').unwrap_or(topic))
-}
-
-fn silence(whole: Span) -> i64 {
-    SILENCE.0.max(whole.nanos() / SILENCE.1)
-}
-
-/// An interval at one rate, in messages per second.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Piece {
-    pub(crate) span: Span,
-    pub(crate) hz: f64,
-}
-
-/// The times at which the log has steps of rates, by topic and node.
-pub(crate) struct Steps(BTreeSet<(TopicId, Option<NodeId>, Stamp)>);
-
-impl Steps {
-    pub(crate) fn new(source: &FigureSource<'_>) -> Self {
-        let events = source.mission.log.events.iter();
-        let steps = events.filter(|e| e.kind == Kind::Rate).filter_map(|e| {
-            let (node, topic) = source.mission.elements.ends(e.what);
-            Some((topic?, node, e.time))
-        });
-        Self(steps.collect())
-    }
-
-    fn has(&self, sender: &Sender, at: Stamp) -> bool {
-        let is = |node| self.0.contains(&(sender.topic, node, at));
-        is(sender.node) || is(None)
-    }
-
-    /// The rates of a sender: its stretches, joined unless a step of the log or a long silence separates
-    /// them.
-    pub(crate) fn pieces(&self, sender: &Sender, whole: Span) -> Vec<Piece> {
-        let least = silence(whole);
-        let parts =
-            |a: &Stretch, b: &Stretch| !self.has(sender, b.first) && b.first.since(a.last) < least;
-        let runs = sender.stretches.chunk_by(parts);
-        let piece = |run: &[Stretch]| {
-            let (start, end) = (run.first()?.first, run.last()?.last);
-            let nanos = end.since(start);
-            let count: u64 = run.iter().fold(0, |n, s| n.saturating_add(s.count));
-            let mean = count.saturating_sub(1) as f64 * 1e9 / nanos.max(1) as f64;
-            Some(Piece {
-                span: Span::new(start, end.plus(1)),
-                hz: match run {
-                    [one] => one.hz(),
-                    _ if nanos > 0 => mean,
-                    _ => 0.0,
-                },
-            })
-        };
-        runs.filter_map(piece).collect()
-    }
-}
-
-/// The mean rate over the bars; `None` if they have no length.
-pub(crate) fn mean(pieces: &[Piece]) -> Option<f64> {
-    let seconds = |p: &Piece| (p.span.nanos() - 1) as f64 / 1e9;
-    let time: f64 = pieces.iter().map(seconds).sum();
-    let count: f64 = pieces.iter().map(|p| p.hz * seconds(p)).sum();
-    (time > 1e-3).then(|| count / time)
-}
-
-/// The sum of several rates over time. Pieces too short to be visible belong to their neighbours, and so do silences.
-fn summed(rates: &[Vec<Piece>], whole: Span) -> Vec<Piece> {
-    // The changes of the rate, and of the number of senders.
-    let mut turns: BTreeMap<Stamp, (f64, i64)> = BTreeMap::new();
-    for piece in rates.iter().flatten() {
-        for (at, sign) in [(piece.span.start, 1), (piece.span.end, -1)] {
-            let turn = turns.entry(at).or_default();
-            *turn = (turn.0 + piece.hz * sign as f64, turn.1 + sign);
-        }
-    }
-    let is_short = |span: Span| span.nanos() < whole.nanos() / SEEN;
-    let mut found: Vec<Piece> = Vec::new();
-    let (mut hz, mut many) = (0.0, 0);
-    for ((at, turn), end) in turns.iter().zip(turns.keys().skip(1)) {
-        (hz, many) = (hz + turn.0, many + turn.1);
-        let new = Piece {
-            span: Span::new(*at, *end),
-            hz: f64::max(hz, 0.0),
-        };
-        let before = found.last_mut();
-        match before.filter(|last| at.since(last.span.end) < silence(whole)) {
-            _ if many == 0 => {}
-            Some(last) if same(last.hz, new.hz) || is_short(new.span) => last.span.end = *end,
-            Some(last) if is_short(last.span) => (last.span.end, last.hz) = (*end, new.hz),
-            Some(last) => {
-                last.span.end = *at;
-                found.push(new);
-            }
-            None => found.push(new),
-        }
-    }
-    found
-}
-
-/// Whether two rates cannot be distinguished as heights of bars.
-fn same(a: f64, b: f64) -> bool {
-    (a - b).abs() <= 0.01 * a.max(b)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const SECOND: i64 = 1_000_000_000;
-
-    fn span(from: i64, to: i64) -> Span {
-        Span::new(Stamp(from * SECOND), Stamp(to * SECOND))
-    }
-
-    fn reported(rates: &[&[(i64, i64, f64)]]) -> Vec<(i64, i64, f64)> {
-        let pieces = |all: &&[(i64, i64, f64)]| {
-            let piece = |(from, to, hz): &(i64, i64, f64)| Piece {
-                span: span(*from, *to),
-                hz: *hz,
-            };
-            all.iter().map(piece).collect::<Vec<Piece>>()
-        };
-        let rates: Vec<Vec<Piece>> = rates.iter().map(pieces).collect();
-        let second = |at: Stamp| at.0 / SECOND;
-        let all = summed(&rates, span(0, 800)).into_iter();
-        all.map(|p| (second(p.span.start), second(p.span.end), libm::round(p.hz)))
-            .collect()
-    }
-
-    #[test]
-    fn rates_add_up_while_they_overlap() {
-        let found = reported(&[&[(0, 100, 10.0)], &[(50, 200, 5.0)]]);
-        assert_eq!(found, [(0, 50, 10.0), (50, 100, 15.0), (100, 200, 5.0)]);
-    }
-
-    #[test]
-    fn invisibly_short_runs_are_not_steps() {
-        let found = reported(&[&[(0, 100, 10.0)], &[(1, 100, 5.0)]]);
-        assert_eq!(found, [(0, 100, 15.0)]);
-        let found = reported(&[&[(0, 100, 10.0), (103, 200, 10.0)]]);
-        assert_eq!(found, [(0, 200, 10.0)]);
-        let found = reported(&[&[(0, 100, 10.0), (150, 200, 10.0)]]);
-        assert_eq!(found, [(0, 100, 10.0), (150, 200, 10.0)]);
-    }
 }

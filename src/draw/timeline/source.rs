@@ -6,8 +6,7 @@ use std::sync::Arc;
 use crate::base::name::{is_quiet, last_part};
 use crate::base::time::Span;
 use crate::evidence::Confidence;
-use crate::graph::history::Sender;
-use crate::graph::{ById, Edge, EdgeId, Element, Node, NodeId, TopicId};
+use crate::graph::{ById, EdgeId, Element, Node, NodeId, TopicId};
 use crate::mission::Mission;
 use crate::mission::event_log::Phase;
 use crate::mission::phases::knows_publishers;
@@ -23,8 +22,6 @@ pub(crate) struct FigureSource<'a> {
     topics: ById<TopicId, bool>,
     /// Per node, its publications on shown topics.
     published: ById<NodeId, Vec<EdgeId>>,
-    /// The only publication of each topic; `None` if there are several.
-    sole: ById<TopicId, Option<EdgeId>>,
     /// The phases; none if there is only one.
     pub(crate) phases: &'a [Phase],
     /// Whether their names are the user's.
@@ -62,7 +59,6 @@ impl<'a> FigureSource<'a> {
             roles,
             topics,
             published,
-            sole: mission.elements.sole_publishers(),
             phases: if phases.len() > 1 { phases } else { &[] },
             is_named,
         }
@@ -111,28 +107,6 @@ impl<'a> FigureSource<'a> {
         let mut own: Vec<EdgeId> = own.copied().collect();
         own.sort_unstable();
         own
-    }
-
-    /// The messages of some publications; for the only one of its topic, all that are not known to come from
-    /// others. A latched publication represents its node by its message, and has no rate.
-    pub(crate) fn senders(&self, edges: &[EdgeId]) -> Vec<&'a Sender> {
-        let edges = edges
-            .iter()
-            .filter_map(|id| Some((*id, self.mission.elements.publishes.get(*id)?)));
-        let sending = &self.mission.sending;
-        let sender = |(id, edge): (EdgeId, &Edge)| {
-            let own = sending.of_edge(edge.node, edge.topic);
-            let is_sole = self.sole.get(edge.topic) == Some(&Some(id));
-            let rest = || {
-                sending
-                    .of_topic(edge.topic)
-                    .iter()
-                    .find(|s| s.node.is_none())
-            };
-            own.or_else(|| rest().filter(|_| is_sole))
-        };
-        let senders = edges.filter_map(sender);
-        senders.filter(|sender| !sender.is_latched).collect()
     }
 
     /// The times in which an element exists.

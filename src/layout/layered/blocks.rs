@@ -10,8 +10,8 @@ use rayon::prelude::*;
 use super::subplan::Subplan;
 use super::{Draft, PlacedPart};
 use crate::base::geometry::{Point, Rect, Size, polyline};
-use crate::layout::routes::around::{End, Map};
-use crate::layout::spacing::PADDING;
+use crate::layout::routes::around::{End, Map, meets};
+use crate::layout::spacing::{PADDING, turned};
 use crate::layout::{
     Component, Layout, LayoutOptions, Link, Orientation, Outline, Plan, Route, Vertex,
 };
@@ -79,7 +79,17 @@ impl<'a> Blocks<'a> {
         let cut = Cut::new(part)?;
         let laid_out = |space: usize, shape: f64| {
             let page = Size::new(options.page.h * shape, options.page.h);
-            let options = LayoutOptions { page, ..*options };
+            // On a page of its own it may be as small as it likes, unless it is a sketch.
+            let least = if options.least.is_finite() {
+                0.0
+            } else {
+                options.least
+            };
+            let options = LayoutOptions {
+                page,
+                least,
+                ..*options
+            };
             let sub = Subplan::new(plan, part, space, |v| cut.space[v] == space);
             let draft = Draft::new(&sub.plan, &options)?;
             let (_, layout) = draft.assembled(&sub.plan, &options, orientation);
@@ -131,7 +141,24 @@ impl<'a> Blocks<'a> {
         }
         // The way between along and across and the page is the same in both directions.
         let mut placed = placed.on_page(self.orientation);
-        placed.crossings = cut.connect(plan, part, &mut placed)? + crossings(&placed.routes);
+        let turns = cut.connect(plan, part, &mut placed)?;
+        let lines: Vec<Line> = placed.routes.iter().map(Line::new).collect();
+        placed.crossings = turns + crossings(&lines);
+        for (at, link) in part.links.iter().enumerate() {
+            let size = plan.links[*link]
+                .label
+                .map(|size| turned(size, self.orientation));
+            let label = placed.routes[at].label.zip(size);
+            let label = label.map(|(middle, size)| Rect::around(middle, size));
+            let is_crossed = |label: Rect| {
+                let others = lines.iter().enumerate().filter(|(other, _)| *other != at);
+                others.into_iter().any(|(_, line)| line.meets(&label))
+            };
+            if label.is_some_and(is_crossed) {
+                // It is placed elsewhere, once everything has its place.
+                placed.routes[at].label = None;
+            }
+        }
         Some(placed.on_page(self.orientation))
     }
 }
@@ -233,22 +260,44 @@ impl Cut {
     }
 }
 
-/// The number of points at which routes cross each other.
-fn crossings(routes: &[Route]) -> u64 {
-    let line = |route: &Route| {
+/// A route in straight pieces, and its bounds.
+struct Line {
+    points: Vec<Point>,
+    bounds: Rect,
+}
+
+impl Line {
+    fn new(route: &Route) -> Self {
         let points = polyline(route.start, &route.curves, PIECES);
         let bounds = Rect::of_points(points.iter().copied()).unwrap_or_default();
-        (points, bounds)
-    };
-    let lines: Vec<(Vec<Point>, Rect)> = routes.iter().map(line).collect();
+        Self {
+            points,
+            bounds: bounds.grown(1.0),
+        }
+    }
+
+    /// Its straight pieces near a rectangle.
+    fn near(&self, rect: &Rect) -> impl Iterator<Item = [Point; 2]> {
+        let is_near = self.bounds.overlaps(rect);
+        let pieces = self.points.windows(2).map(|pair| [pair[0], pair[1]]);
+        pieces.filter(move |_| is_near)
+    }
+
+    fn meets(&self, rect: &Rect) -> bool {
+        self.near(rect).any(|[from, to]| meets(from, to, rect))
+    }
+}
+
+/// The number of points at which lines cross each other.
+fn crossings(lines: &[Line]) -> u64 {
     let mut crossings = 0;
-    for (at, (line, bounds)) in lines.iter().enumerate() {
-        for (other, _) in lines[at + 1..].iter().filter(|(_, b)| b.overlaps(bounds)) {
-            for piece in line.windows(2) {
-                let crossed = other
-                    .windows(2)
-                    .filter(|o| crosses([piece[0], piece[1]], [o[0], o[1]]));
-                crossings += crossed.count() as u64;
+    for (at, line) in lines.iter().enumerate() {
+        for other in &lines[at + 1..] {
+            for piece in line.near(&other.bounds) {
+                crossings += other
+                    .near(&line.bounds)
+                    .filter(|o| crosses(piece, *o))
+                    .count() as u64;
             }
         }
     }

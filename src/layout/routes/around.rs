@@ -51,6 +51,8 @@ pub(crate) fn routes(plan: &Plan, boxes: &[Rect]) -> (Vec<Route>, usize) {
 /// The distance from a box of a lane that an edge turns into: the length of an arrow's head, and half the space between
 /// boxes without lines.
 const LANE: f64 = 10.0;
+/// The length of the bend of an edge that leaves a frame at another height: less than the space between layers.
+const JOG: f64 = 16.0;
 /// The difference below which two positions across are the same, in pixels.
 const SAME: f64 = 0.05;
 /// The radius at which an edge with given points turns.
@@ -97,24 +99,24 @@ fn straight(p: Point, q: Point) -> [Point; 3] {
 }
 
 impl Route {
-    /// The route with its first level piece at another height. A label beside that piece is left to be placed again.
+    /// The route with its start at another height: a first bend becomes higher; a level piece, which may pass between
+    /// other boxes, begins with a bend.
     fn raised(&self, y: f64) -> Self {
-        let old = self.start.y;
         let mut raised = self.clone();
+        let Some(first) = raised.curves.first_mut() else {
+            return raised;
+        };
+        let (start, end) = (self.start, first[2]);
         raised.start.y = y;
-        // The end stays where it is.
-        let movable = (3 * self.curves.len()).saturating_sub(1);
-        let points = raised.curves.iter_mut().flatten().take(movable);
-        let mut reach = self.start.x;
-        for point in points.take_while(|p| (p.y - old).abs() < SAME) {
-            point.y = y;
-            reach = point.x;
+        if (end.y - start.y).abs() > SAME {
+            first[0].y = y;
+        } else if (y - start.y).abs() > SAME {
+            let turn = Point::new(start.x + (end.x - start.x).clamp(-JOG, JOG), start.y);
+            let middle = f64::midpoint(start.x, turn.x);
+            *first = straight(turn, end);
+            let bend = [Point::new(middle, y), Point::new(middle, turn.y), turn];
+            raised.curves.insert(0, bend);
         }
-        let (low, high) = (reach.min(self.start.x), reach.max(self.start.x));
-        let is_beside = |label: &Point| (low..=high).contains(&label.x);
-        raised.label = self
-            .label
-            .filter(|label| (y - old).abs() < SAME || !is_beside(label));
         raised
     }
 
@@ -278,15 +280,20 @@ impl Map {
         let (middle, from) = (end.rect.centre(), route.start);
         let own = (end.at, end.at);
         let level = Point::new(middle.x, middle.y + aside);
-        if self.clear(level, Point::new(from.x, level.y), own) {
-            let start = leaves(&end.rect, end.outline, level, Point::new(from.x, level.y));
-            return Some((route.raised(level.y).along(&[start]), true));
-        }
         let foot = Point::new(middle.x + aside, middle.y);
         let sides = [end.rect.y - LANE, end.rect.bottom() + LANE];
         let mut lanes = sides.map(|y| Point::new(foot.x, y));
         lanes.sort_by(|a, b| (a.y - from.y).abs().total_cmp(&(b.y - from.y).abs()));
-        for lane in lanes {
+        // A route between rows of blocks may start above or below its block.
+        let is_level = route
+            .curves
+            .first()
+            .is_some_and(|first| (first[0].y - from.y).abs() < SAME);
+        if is_level && self.clear(level, Point::new(from.x, level.y), own) {
+            let start = leaves(&end.rect, end.outline, level, Point::new(from.x, level.y));
+            return Some((route.raised(level.y).along(&[start]), true));
+        }
+        for lane in lanes.into_iter().filter(|_| is_level) {
             if self.clear(lane, Point::new(from.x, lane.y), own) && self.clear(foot, lane, own) {
                 let start = leaves(&end.rect, end.outline, foot, lane);
                 return Some((route.raised(lane.y).along(&[start, lane]), false));
@@ -377,7 +384,7 @@ fn traced(points: &[Point], from: &[usize]) -> Vec<Point> {
 }
 
 /// Whether a line runs through the inside of a box (Liang and Barsky 1984).
-fn meets(a: Point, b: Point, rect: &Rect) -> bool {
+pub(crate) fn meets(a: Point, b: Point, rect: &Rect) -> bool {
     let (mut low, mut high) = (0.0_f64, 1.0_f64);
     for (start, way, least, most) in [
         (a.x, b.x - a.x, rect.x, rect.right()),

@@ -1,0 +1,211 @@
+//! The rate of every sender over the mission, in pieces: a piece ends where the log tells another rate, or at a long silence.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::Mission;
+use super::event_log::Kind;
+use crate::base::time::{Span, Stamp};
+use crate::graph::history::{Sender, Stretch};
+use crate::graph::{ById, EdgeId, Element, NodeId, TopicId};
+
+/// The length above which a silence visibly interrupts a rate: in nanoseconds, and as a fraction of the
+/// mission (one in so many).
+const SILENCE: (i64, i64) = (4_000_000_000, 83);
+/// The shortest visible piece, as a fraction of the mission (one in so many). Shorter ones join the previous one.
+const SEEN: i64 = 400;
+
+/// An interval at one rate, in messages per second.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Piece {
+    pub(crate) span: Span,
+    pub(crate) hz: f64,
+}
+
+/// The rates of a mission's senders.
+pub(crate) struct Rates<'a> {
+    mission: &'a Mission,
+    /// The times at which the log has steps of rates, by topic and node.
+    steps: BTreeSet<(TopicId, Option<NodeId>, Stamp)>,
+    /// The only publication of each topic; `None` if there are several.
+    sole: ById<TopicId, Option<EdgeId>>,
+}
+
+impl<'a> Rates<'a> {
+    pub(crate) fn new(mission: &'a Mission) -> Self {
+        let events = mission.log.events.iter();
+        let steps = events.filter(|e| e.kind == Kind::Rate).filter_map(|e| {
+            let (node, topic) = mission.elements.ends(e.what);
+            Some((topic?, node, e.time))
+        });
+        Self {
+            steps: steps.collect(),
+            sole: mission.elements.sole_publishers(),
+            mission,
+        }
+    }
+
+    /// The messages of some publications; for the only one of its topic, all that are not known to come from
+    /// others. A latched publication represents its node by its message, and has no rate.
+    pub(crate) fn senders(&self, edges: &[EdgeId]) -> Vec<&'a Sender> {
+        let sending = &self.mission.sending;
+        let sender = |id: &EdgeId| {
+            let edge = self.mission.elements.publishes.get(*id)?;
+            let own = sending.of_edge(edge.node, edge.topic);
+            let is_sole = self.sole.get(edge.topic) == Some(&Some(*id));
+            let mut of_topic = sending.of_topic(edge.topic).iter();
+            own.or_else(|| of_topic.find(|s| s.node.is_none()).filter(|_| is_sole))
+        };
+        let senders = edges.iter().filter_map(sender);
+        senders.filter(|sender| !sender.is_latched).collect()
+    }
+
+    /// The messages on a topic, as far as they are not latched.
+    pub(crate) fn of_topic(&self, topic: TopicId) -> Vec<&'a Sender> {
+        let senders = self.mission.sending.of_topic(topic).iter();
+        senders.filter(|sender| !sender.is_latched).collect()
+    }
+
+    /// The publications among some elements; on the topic of this name, if one is given.
+    pub(crate) fn publications(&self, among: &[Element], topic: Option<&str>) -> Vec<EdgeId> {
+        let elements = &self.mission.elements;
+        let is_on = |id: &EdgeId| {
+            let edge = elements.publishes.get(*id);
+            topic.is_none_or(|name| {
+                edge.is_some_and(|e| elements.topics[e.topic].name.as_str() == name)
+            })
+        };
+        let edges = among.iter().filter_map(|what| match what {
+            Element::Publish(id) => Some(*id),
+            _ => None,
+        });
+        edges.filter(is_on).collect()
+    }
+
+    /// The rate of some senders together over time. Pieces too short to be visible belong to their neighbours, and so do
+    /// silences.
+    pub(crate) fn of(&self, senders: &[&Sender]) -> Vec<Piece> {
+        let rates: Vec<Vec<Piece>> = senders.iter().map(|sender| self.pieces(sender)).collect();
+        summed(&rates, self.mission.span)
+    }
+
+    /// The rates of a sender: its stretches, joined unless a step of the log or a long silence separates
+    /// them.
+    fn pieces(&self, sender: &Sender) -> Vec<Piece> {
+        let least = silence(self.mission.span);
+        let is_step = |at: Stamp| {
+            let is = |node| self.steps.contains(&(sender.topic, node, at));
+            is(sender.node) || is(None)
+        };
+        let joins = |a: &Stretch, b: &Stretch| !is_step(b.first) && b.first.since(a.last) < least;
+        let runs = sender.stretches.chunk_by(joins);
+        let piece = |run: &[Stretch]| {
+            let (start, end) = (run.first()?.first, run.last()?.last);
+            let nanos = end.since(start);
+            let count: u64 = run.iter().fold(0, |n, s| n.saturating_add(s.count));
+            let mean = count.saturating_sub(1) as f64 * 1e9 / nanos.max(1) as f64;
+            Some(Piece {
+                span: Span::new(start, end.plus(1)),
+                hz: match run {
+                    [one] => one.hz(),
+                    _ if nanos > 0 => mean,
+                    _ => 0.0,
+                },
+            })
+        };
+        runs.filter_map(piece).collect()
+    }
+}
+
+/// The mean rate over some pieces; `None` if they have no length.
+pub(crate) fn mean(pieces: &[Piece]) -> Option<f64> {
+    let seconds = |p: &Piece| (p.span.nanos() - 1) as f64 / 1e9;
+    let time: f64 = pieces.iter().map(seconds).sum();
+    let count: f64 = pieces.iter().map(|p| p.hz * seconds(p)).sum();
+    (time > 1e-3).then(|| count / time)
+}
+
+/// The length above which a silence visibly interrupts a rate in a mission of this length.
+pub(crate) fn silence(whole: Span) -> i64 {
+    SILENCE.0.max(whole.nanos() / SILENCE.1)
+}
+
+/// The sum of several rates over time. Pieces too short to be visible belong to their neighbours, and so do silences.
+fn summed(rates: &[Vec<Piece>], whole: Span) -> Vec<Piece> {
+    // The changes of the rate, and of the number of senders.
+    let mut turns: BTreeMap<Stamp, (f64, i64)> = BTreeMap::new();
+    for piece in rates.iter().flatten() {
+        for (at, sign) in [(piece.span.start, 1), (piece.span.end, -1)] {
+            let turn = turns.entry(at).or_default();
+            *turn = (turn.0 + piece.hz * sign as f64, turn.1 + sign);
+        }
+    }
+    let is_short = |span: Span| span.nanos() < whole.nanos() / SEEN;
+    let mut found: Vec<Piece> = Vec::new();
+    let (mut hz, mut many) = (0.0, 0);
+    for ((at, turn), end) in turns.iter().zip(turns.keys().skip(1)) {
+        (hz, many) = (hz + turn.0, many + turn.1);
+        let new = Piece {
+            span: Span::new(*at, *end),
+            hz: f64::max(hz, 0.0),
+        };
+        let before = found.last_mut();
+        match before.filter(|last| at.since(last.span.end) < silence(whole)) {
+            _ if many == 0 => {}
+            Some(last) if same(last.hz, new.hz) || is_short(new.span) => last.span.end = *end,
+            Some(last) if is_short(last.span) => (last.span.end, last.hz) = (*end, new.hz),
+            Some(last) => {
+                last.span.end = *at;
+                found.push(new);
+            }
+            None => found.push(new),
+        }
+    }
+    found
+}
+
+/// Whether two rates cannot be distinguished as heights of bars.
+pub(crate) fn same(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 0.01 * a.max(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: i64 = 1_000_000_000;
+
+    fn span(from: i64, to: i64) -> Span {
+        Span::new(Stamp(from * SECOND), Stamp(to * SECOND))
+    }
+
+    fn reported(rates: &[&[(i64, i64, f64)]]) -> Vec<(i64, i64, f64)> {
+        let pieces = |all: &&[(i64, i64, f64)]| {
+            let piece = |(from, to, hz): &(i64, i64, f64)| Piece {
+                span: span(*from, *to),
+                hz: *hz,
+            };
+            all.iter().map(piece).collect::<Vec<Piece>>()
+        };
+        let rates: Vec<Vec<Piece>> = rates.iter().map(pieces).collect();
+        let second = |at: Stamp| at.0 / SECOND;
+        let all = summed(&rates, span(0, 800)).into_iter();
+        all.map(|p| (second(p.span.start), second(p.span.end), libm::round(p.hz)))
+            .collect()
+    }
+
+    #[test]
+    fn rates_add_up_while_they_overlap() {
+        let found = reported(&[&[(0, 100, 10.0)], &[(50, 200, 5.0)]]);
+        assert_eq!(found, [(0, 50, 10.0), (50, 100, 15.0), (100, 200, 5.0)]);
+    }
+
+    #[test]
+    fn invisibly_short_runs_are_not_steps() {
+        let found = reported(&[&[(0, 100, 10.0)], &[(1, 100, 5.0)]]);
+        assert_eq!(found, [(0, 100, 15.0)]);
+        let found = reported(&[&[(0, 100, 10.0), (103, 200, 10.0)]]);
+        assert_eq!(found, [(0, 200, 10.0)]);
+        let found = reported(&[&[(0, 100, 10.0), (150, 200, 10.0)]]);
+        assert_eq!(found, [(0, 100, 10.0), (150, 200, 10.0)]);
+    }
+}
