@@ -386,7 +386,7 @@ fn rules_about_times_after_the_mission_are_not_broken() {
             &["check", "run.bag", "--expect", "g.yaml", "--end", end],
         )
     };
-    let presence = "node: /spare, within: 20s";
+    let presence = "nodes: /spare, within: 20s";
     let (code, said) = check(presence, "15");
     assert!(
         code == 2 && said.contains("the mission lasts 15 s"),
@@ -414,7 +414,7 @@ fn outcomes() -> tempfile::TempDir {
     write("unknown.yaml", "topics:\n  /scan: {to: [/base]}\n");
     write(
         "blind.yaml",
-        "rules:\n  - {id: x, node: /lidar, lifecycle: active}\n",
+        "rules:\n  - {id: x, nodes: /lidar, lifecycle: active}\n",
     );
     write("wrong.yaml", "nodes:\n  /lidar: {restart: 0}\n");
     dir
