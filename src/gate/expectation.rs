@@ -160,6 +160,12 @@ impl Entry {
         Fact(self.may_end.filter(|limit| limit.value.0 != During::WHOLE))
     }
 
+    /// Whether later windows leave the judgement of earlier ones as it is.
+    pub(crate) fn is_fixed(&self) -> bool {
+        let during = self.during.as_ref();
+        self.percent.is_none() && during.is_none_or(|during| during.value.is_fixed())
+    }
+
     /// Whether so many of these windows may be out of range.
     pub(crate) fn tolerates(&self, bad: usize, windows: usize) -> bool {
         let percent = self.percent.as_ref().map_or(100.0, |p| p.value.0);
