@@ -82,11 +82,12 @@ pub(crate) fn table(columns: &[Column], rows: &[Vec<Cell>], width: Option<usize>
             }
             line.push_str("  ");
             let text = cell.fitted(*width, *cut);
-            line += &if column.is_right {
+            let padded = if column.is_right {
                 format!("{text:>width$}")
             } else {
                 format!("{text:<width$}")
             };
+            line.push_str(&padded);
         }
         out.push_str(line.trim_end());
         out.push('\n');

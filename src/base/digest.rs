@@ -12,7 +12,9 @@ pub(crate) fn policy(text: &str) -> String {
 
 /// Bytes as hexadecimal digits.
 pub(crate) fn hex_of(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+    let digit = |n: u8| char::from_digit(n.into(), 16).unwrap_or('0');
+    let digits = bytes.iter().flat_map(|b| [digit(b >> 4), digit(b & 15)]);
+    digits.collect()
 }
 
 /// The first `digits` hex digits of a text's digest, 64 at most.

@@ -152,7 +152,7 @@ fn counts(facts: &[Facts<'_>; 2], known: &[Difference]) -> Vec<Difference> {
     let own = topics(&facts[0]).into_iter().filter_map(|(name, first)| {
         let both = [first, *theirs.get(name)?];
         let is_reported = known.iter().any(|d| {
-            let mut publishers = both.iter().flat_map(|own| own.publishers());
+            let mut publishers = both.iter().flat_map(TopicIn::publishers);
             d.is_known && (d.element == name || publishers.any(|role| role == d.element))
         });
         let counts = both.map(|own| own.facts.messages(own.id));

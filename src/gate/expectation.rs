@@ -22,11 +22,7 @@ const NODE: &str = "forbidden optional may_end known_by restarts lifecycle withi
 const TOPIC: &str = "forbidden optional may_end type by to hz mean_hz percent max_gap within age bytes drops latched qos \
     during";
 /// The keys that determine the form of a rule, each with the other allowed keys.
-const FORMS: [(&str, &str); 3] = [
-    ("nodes", NODE),
-    ("topic", TOPIC),
-    ("changes", "during"),
-];
+const FORMS: [(&str, &str); 3] = [("nodes", NODE), ("topic", TOPIC), ("changes", "during")];
 
 /// A whole `graph.yaml`.
 #[derive(Clone, Debug, PartialEq)]

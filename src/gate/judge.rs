@@ -5,7 +5,9 @@ mod topic;
 
 use std::cell::Cell;
 
-use super::expectation::{At, Demand, Entry, Expectation, Fact, Named, Rule, Unlisted, Within, YamlPlace};
+use super::expectation::{
+    At, Demand, Entry, Expectation, Fact, Named, Rule, Unlisted, Within, YamlPlace,
+};
 use super::facts::Facts;
 use super::finding::{Cause, Finding, FindingKind, Severity, number};
 use super::values::{During, NamePatterns, Pattern, Range};
@@ -457,7 +459,9 @@ fn is_open(finding: &Finding, entry: &Entry, part: &Mission, lacks_start: bool) 
         | FindingKind::NodeLate
         | FindingKind::TopicMissing
         | FindingKind::TopicLate => !entry.within.as_ref().is_some_and(is_over),
-        FindingKind::TopicGap => finding.when.is_none_or(|when| when.end >= part.span.end) || !entry.is_fixed(),
+        FindingKind::TopicGap => {
+            finding.when.is_none_or(|when| when.end >= part.span.end) || !entry.is_fixed()
+        }
         FindingKind::TopicRateLow
         | FindingKind::TopicRateHigh
         | FindingKind::TopicAge

@@ -15,7 +15,7 @@ use bagreel::internals::pipeline::follow::{Feed, FindingFeed, Follow, Growth};
 use bagreel::internals::pipeline::{Reading, Unwatched, read};
 use tempfile::TempDir;
 
-use super::recorders::{active, Chance, EXAMPLES, RECORDERS, Recorder};
+use super::recorders::{Chance, EXAMPLES, RECORDERS, Recorder, active};
 
 /// A line of the log without time, rates, and length of a silence, which are more precise at the end, as is whether the
 /// first message of a topic is a beginning.
@@ -169,9 +169,10 @@ fn found(bag: &Path, expect: &Path) -> Vec<String> {
     let (mut follow, mut printed) = (None, Vec::new());
     for step in 1..=STEPS {
         let cut = bytes.len() * step / STEPS;
-        let now = match cut < bytes.len() && is_rosbag {
-            true => active(&bytes, cut),
-            false => bytes[..cut].to_vec(),
+        let now = if cut < bytes.len() && is_rosbag {
+            active(&bytes, cut)
+        } else {
+            bytes[..cut].to_vec()
         };
         // As by a recorder, in the same file.
         let mut file = std::fs::OpenOptions::new();
@@ -183,7 +184,11 @@ fn found(bag: &Path, expect: &Path) -> Vec<String> {
         while follow.poll().unwrap() == Growth::More {}
         if let Some(known) = follow.so_far(u64::MAX, length).unwrap() {
             let lines = findings.new_lines(&known, LogFormat::Text);
-            printed.extend(lines.iter().map(|line| format!("{step}: {}", line.text(None))));
+            printed.extend(
+                lines
+                    .iter()
+                    .map(|line| format!("{step}: {}", line.text(None))),
+            );
         }
     }
     printed
@@ -211,8 +216,15 @@ fn following_a_healthy_run_prints_no_finding() {
             scope.spawn(move || {
                 let folder = TempDir::new().unwrap();
                 let own = folder.path().join("graph.yaml");
-                let args = [OsStr::new("baseline"), bag.as_os_str(), OsStr::new("-o"), own.as_os_str()];
-                let done = Command::new(env!("CARGO_BIN_EXE_bagreel")).args(args).output();
+                let args = [
+                    OsStr::new("baseline"),
+                    bag.as_os_str(),
+                    OsStr::new("-o"),
+                    own.as_os_str(),
+                ];
+                let done = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+                    .args(args)
+                    .output();
                 assert!(done.unwrap().status.success());
                 assert_eq!(found(bag, &own), [""; 0], "{}", bag.display());
             });
@@ -228,7 +240,10 @@ fn what_is_missing_is_printed_once_its_time_is_over() {
     let text = "schema: bagreel.expect/1\ntopics:\n  /lost: {within: ..5s}\n  /later: {}\n";
     std::fs::write(&file, text).unwrap();
     let lines = found(&bag, &file);
-    assert!(lines.len() == 1 && lines[0].contains("/lost is not in the bag"), "{lines:?}");
+    assert!(
+        lines.len() == 1 && lines[0].contains("/lost is not in the bag"),
+        "{lines:?}"
+    );
 }
 
 /// `cargo test --release --test tests follow::law -- --ignored --nocapture`

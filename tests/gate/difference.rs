@@ -196,9 +196,17 @@ fn rhythms() -> Recording {
     topic("/steady", &[(0, 120_000)], 50);
     topic("/even", &[(500, 120_000)], 100);
     topic("/slow", &[(900, 120_000)], 1000);
-    let bursts: Vec<(i64, i64)> = (0..8).map(|n| (n * 15_000 + 700, n * 15_000 + 2700)).collect();
+    let bursts: Vec<(i64, i64)> = (0..8)
+        .map(|n| (n * 15_000 + 700, n * 15_000 + 2700))
+        .collect();
     topic("/bursts", &bursts, 50);
-    let uneven = [(3000, 9000), (11_000, 12_000), (40_000, 71_000), (75_000, 76_500), (99_000, 118_000)];
+    let uneven = [
+        (3000, 9000),
+        (11_000, 12_000),
+        (40_000, 71_000),
+        (75_000, 76_500),
+        (99_000, 118_000),
+    ];
     topic("/uneven", &uneven, 70);
     topic("/paused", &[(1000, 30_000), (60_000, 119_000)], 100);
     all
@@ -238,7 +246,8 @@ fn what_check_finds_with_a_baseline_of_a_run_diff_finds_too() {
             };
             let names = |json: &serde_json::Value| -> Vec<String> {
                 let rows = json.as_array().into_iter().flatten();
-                rows.map(|row| row["name"].as_str().unwrap().to_owned()).collect()
+                rows.map(|row| row["name"].as_str().unwrap().to_owned())
+                    .collect()
             };
             let checked = read(&["check", "b.bag", "--expect", "graph.yaml"]);
             let rules = checked["rules"].as_array().unwrap().iter();
@@ -246,7 +255,9 @@ fn what_check_finds_with_a_baseline_of_a_run_diff_finds_too() {
             let differs = names(&read(&["diff", "a.bag", "b.bag"])["differences"]);
             let topic = publisher.topic.as_str();
             let is_named = |names: &[String]| {
-                names.iter().any(|name| name.contains(topic) || name.contains(&publisher.node))
+                names
+                    .iter()
+                    .any(|name| name.contains(topic) || name.contains(&publisher.node))
             };
             if is_named(&found) && !is_named(&differs) {
                 missed.push(format!("{topic} {fault}: {found:?}"));

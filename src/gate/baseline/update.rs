@@ -505,7 +505,8 @@ topics:
 
     #[test]
     fn only_the_value_is_changed() {
-        let topic = |name, key, value| move |t: &mut EditedText| t.write("topics", name, key, Some(value));
+        let topic =
+            |name, key, value| move |t: &mut EditedText| t.write("topics", name, key, Some(value));
         replaces(topic("/scan", "hz", "5..6"), "9..11", "5..6");
         replaces(topic("/scan", "by", "[/z]"), "[/a, \"/b: x\"]", "[/z]");
         replaces(topic("/block", "hz", "5..6"), "1..2", "5..6");
@@ -529,7 +530,11 @@ topics:
     fn entries_are_added_and_removed_with_their_lines() {
         replaces(|t| t.drop_entry("nodes", "/a"), "  /a: {} # first\n", "");
         replaces(|t| t.drop_entry("topics", "/null"), "  /null:\n", "");
-        replaces(|t| t.write("topics", "/scan", "hz", None), "hz: 9..11, ", "");
+        replaces(
+            |t| t.write("topics", "/scan", "hz", None),
+            "hz: 9..11, ",
+            "",
+        );
         let by = ", by: [/a, \"/b: x\"]";
         replaces(|t| t.write("topics", "/scan", "by", None), by, "");
         let insert = |name| move |t: &mut EditedText| t.insert("nodes", name, "{}");

@@ -215,7 +215,10 @@ fn chart(facts: &Facts<'_>, findings: &[&Finding]) -> Option<String> {
         marked.entry(own).or_insert(finding);
     }
     let arrows = arrows(facts, &marked, findings);
-    let mut boxes: BTreeSet<ChartBox<'_>> = arrows.iter().flat_map(|(from, _, to)| [*from, *to]).collect();
+    let mut boxes: BTreeSet<ChartBox<'_>> = arrows
+        .iter()
+        .flat_map(|(from, _, to)| [*from, *to])
+        .collect();
     boxes.extend(marked.keys().take(MOST_ITEMS));
     (!boxes.is_empty()).then(|| written(&boxes, &marked, &arrows))
 }
