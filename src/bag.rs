@@ -27,9 +27,9 @@ use std::path::{Path, PathBuf};
 
 use crate::base::error::{Error, Result};
 
-pub(crate) use adapters::known_span;
+pub(crate) use adapters::{Bounds, known_span};
 pub(crate) use deferred::open_each;
-pub(crate) use folder::{Recording, parts_of, plain, recordings};
+pub(crate) use folder::{Recording, parts_of, plain, recordings, written};
 pub(crate) use input::BagPlace;
 pub use input::{FormatRow, Input, file_name, size_on_disk};
 use input::{closed, head, place};

@@ -142,7 +142,7 @@ pub mod values {
         Detail, Event, EventId, Interruption, InterruptionKind, Kind, Phase,
     };
     pub use crate::mission::info::{
-        BagInfo, ConfidenceCounts, EvidenceInfo, FigureInfo, NodeInfo, SurveyRow, TopicInfo,
+        ConfidenceCounts, EvidenceInfo, FigureInfo, NodeInfo, SurveyRow, TopicInfo,
     };
     pub use crate::mission::{Place, Places};
     pub use crate::pipeline::{Phases, Stage, Unwatched, Watch};

@@ -31,6 +31,8 @@ mod survey;
 #[cfg(feature = "render")]
 mod tables;
 #[cfg(feature = "render")]
+mod times;
+#[cfg(feature = "render")]
 mod unfolded;
 mod verify;
 

@@ -25,6 +25,7 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
     (
         "serde_json",
         &[
+            "base/csv",
             "base/yaml",
             "evidence/source/qos",
             "evidence/given",

@@ -411,3 +411,35 @@ fn options_without_effect_on_a_figure_are_refused() {
         assert!(figure(&example(), flags).is_err(), "{flags:?}");
     }
 }
+
+#[test]
+fn every_figure_that_info_lists_is_drawn() {
+    let project = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut short = crate::support::Recording::default();
+    for (node, topic, from) in [("/talker", "/chat", 0), ("/late", "/more", 3400)] {
+        let place = short.publisher(node, topic, "std_msgs/String");
+        short.send(place, (from, 30_000), 100, b"\x05\0\0\0hello");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("short.bag");
+    let pack = crate::support::rosbag1::Pack::None;
+    std::fs::write(&path, crate::support::rosbag1::write(&short, pack, 20_000)).unwrap();
+    let shared = project.join("../shared/data");
+    let bags = [
+        path,
+        example(),
+        project.join("examples/courier.mcap"),
+        shared.join("mini/mini_late.bag"),
+        shared.join("mini/nodelet.bag"),
+        shared.join("bags/paper/turtlesim.bag"),
+        shared.join("bags/paper/mcap1"),
+        shared.join("bags/mission/split_lz4_3.bag"),
+    ];
+    for bag in bags.iter().filter(|bag| bag.exists()) {
+        let mission = bagreel::read(&bagreel::Reading::of([bag])).unwrap();
+        for one in bagreel::commands::info(&mission).figures {
+            let drawn = figure(bag, &["--kind", one.figure]);
+            assert!(drawn.is_ok(), "{} {}: {drawn:?}", bag.display(), one.figure);
+        }
+    }
+}

@@ -386,7 +386,7 @@ fn rules_about_times_after_the_mission_are_not_broken() {
             &["check", "run.bag", "--expect", "g.yaml", "--end", end],
         )
     };
-    let presence = "node: /spare, within: 20s";
+    let presence = "nodes: /spare, within: 20s";
     let (code, said) = check(presence, "15");
     assert!(
         code == 2 && said.contains("the mission lasts 15 s"),
@@ -414,7 +414,7 @@ fn outcomes() -> tempfile::TempDir {
     write("unknown.yaml", "topics:\n  /scan: {to: [/base]}\n");
     write(
         "blind.yaml",
-        "rules:\n  - {id: x, node: /lidar, lifecycle: active}\n",
+        "rules:\n  - {id: x, nodes: /lidar, lifecycle: active}\n",
     );
     write("wrong.yaml", "nodes:\n  /lidar: {restart: 0}\n");
     dir
@@ -620,4 +620,39 @@ fn a_silence_across_windows_is_reported_to_the_millisecond() {
             .contains("max_gap: 1.8s")
     );
     assert_eq!(run(here, &["check", "run.bag", "--expect", "g.yaml"]).0, 0);
+}
+
+#[test]
+fn two_runs_a_day_apart_are_not_one_mission() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let day = recording(HEALTHY, 0);
+    let (mut next, mut soon) = (recording(HEALTHY, 0), recording(HEALTHY, 0));
+    let later = |recording: &mut Recording, seconds: i64| {
+        for (_, time, _) in &mut recording.messages {
+            *time += seconds * 1_000_000_000;
+        }
+    };
+    later(&mut next, 86_400);
+    later(&mut soon, 190);
+    bag(here, "day.bag", &day);
+    bag(here, "next.bag", &next);
+    bag(here, "soon.bag", &soon);
+    run(here, &["baseline", "day.bag", "-o", "graph.yaml"]);
+    let check = ["check", "day.bag", "next.bag", "--expect", "graph.yaml"];
+    let (code, said) = run(here, &check);
+    assert!(
+        code == 2 && said.contains("`next.bag` begins 23 h 57 min after `day.bag` ends"),
+        "{code} {said}"
+    );
+    for command in ["info", "events"] {
+        let (code, said) = run(here, &[command, "day.bag", "next.bag"]);
+        let first = said.lines().find(|line| line.starts_with("note: "));
+        assert!(
+            code == 0 && first.is_some_and(|line| line.contains("`bagreel diff`")),
+            "{said}"
+        );
+        let (_, said) = run(here, &[command, "day.bag", "soon.bag"]);
+        assert!(!said.contains("longer than the recordings"), "{said}");
+    }
 }

@@ -1,7 +1,7 @@
 //! Property tests of graphs and missions.
 
 use bagreel::internals::evidence::Confidence;
-use bagreel::internals::graph::diff::{apply, diff};
+use bagreel::internals::graph::diff::{Diff, diff};
 use bagreel::internals::graph::{ElementState, Graph, State};
 use std::collections::BTreeSet;
 
@@ -12,6 +12,17 @@ use proptest::prelude::*;
 
 use crate::support::Recording;
 use crate::support::rosbag1::{self, Pack};
+
+/// The graph that a difference from `before` describes.
+pub(crate) fn apply(before: &Graph, diff: &Diff) -> Graph {
+    let changed = diff.changed.iter().map(|(before, _)| before.what);
+    let gone: BTreeSet<Element> = diff.removed.iter().copied().chain(changed).collect();
+    let kept = before.states.iter().filter(|s| !gone.contains(&s.what));
+    let fresh = diff.changed.iter().map(|(_, after)| after);
+    let mut states: Vec<_> = kept.chain(&diff.added).chain(fresh).cloned().collect();
+    states.sort_by_key(|state| state.what);
+    Graph { states }
+}
 
 fn state() -> impl Strategy<Value = State> {
     prop::sample::select(State::ALL.to_vec())
@@ -50,13 +61,13 @@ fn graph() -> impl Strategy<Value = Graph> {
 proptest! {
     #[test]
     fn a_graph_has_no_difference_from_itself(graph in graph()) {
-        prop_assert!(diff(&graph, &graph).is_empty());
+        prop_assert!(diff(&graph, &graph) == Diff::default());
     }
 
     #[test]
     fn a_diff_turns_one_graph_into_the_other(before in graph(), after in graph()) {
         let diff = diff(&before, &after);
-        prop_assert_eq!(diff.is_empty(), before == after);
+        prop_assert_eq!(diff == Diff::default(), before == after);
         prop_assert_eq!(apply(&before, &diff), after);
     }
 }

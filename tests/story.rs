@@ -4,12 +4,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use bagreel::internals::base::time::Period;
-use bagreel::internals::graph::diff::{apply, diff};
+use bagreel::internals::graph::diff::diff;
 use bagreel::internals::graph::window::Length;
 use bagreel::internals::mission::event_log::Kind;
 use bagreel::internals::mission::event_log::{LogFormat, LogOptions, log};
 use bagreel::internals::mission::{Mission, read_json, write_json};
 use bagreel::{Reading, read};
+
+use crate::properties::apply;
 
 /// An example mission in windows of this many seconds.
 fn mission(file: &str, seconds: i64) -> Mission {

@@ -62,6 +62,19 @@ impl Sink for Clip<'_> {
     }
 }
 
+/// A sink that keeps only the time covered.
+#[derive(Default)]
+pub(crate) struct Bounds(pub(crate) Option<Span>);
+
+impl Sink for Bounds {
+    fn stamps(&mut self, _: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
+        for at in stamps {
+            let own = Span::new(*at, at.plus(1));
+            self.0 = Some(self.0.map_or(own, |all| all.hull(own)));
+        }
+    }
+}
+
 /// The time span covered by all bags; `None` unless each reports its own without being read.
 ///
 /// # Errors

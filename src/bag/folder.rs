@@ -147,9 +147,9 @@ pub(crate) fn newest(folder: &Path, grows: impl Fn(&Path) -> bool) -> Option<Pat
 }
 
 /// The last time at which a file, or one in a folder, was written.
-fn written(path: &Path) -> Option<SystemTime> {
+pub(crate) fn written(path: &Path) -> Option<SystemTime> {
     let inside = fs::read_dir(path).into_iter().flatten().flatten();
-    let inside = inside.filter_map(|entry| entry.metadata().ok()?.modified().ok());
+    let inside = inside.filter_map(|entry| fs::metadata(entry.path()).ok()?.modified().ok());
     inside.chain(path.metadata().ok()?.modified().ok()).max()
 }
 

@@ -4,6 +4,8 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
+use serde::Serialize;
+
 use crate::base::error::Result;
 use crate::base::ids::ids;
 use crate::base::name::{NodeName, TopicName};
@@ -149,7 +151,8 @@ pub trait Sink {
 
 worded! {
     /// The way a bag was read; `reading.md` calls them tiers.
-    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+    #[serde(rename_all = "lowercase")]
     pub enum Tier {
         /// By its index: only wanted payloads are read.
         #[default]
@@ -161,8 +164,8 @@ worded! {
     }
 }
 
-/// A reader's report about its bag after reading.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+/// A reader's report about its bag after reading. `info` writes it as JSON with these names.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Report {
     /// The file's or folder's own name, without a path.
     pub name: String,
@@ -177,6 +180,7 @@ pub struct Report {
     /// Whether nothing was lost.
     pub complete: bool,
     /// Bytes read from the file, for benchmarks; 0 if unknown.
+    #[serde(skip)]
     pub bytes_read: u64,
     /// The size of the bag on disk in bytes; 0 if unknown.
     pub file_bytes: u64,

@@ -30,7 +30,7 @@ pub(crate) enum Cell {
 
 /// The most characters of bars.
 const MOST_BARS: usize = 32;
-const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+const BARS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 /// The space between columns, and before the first of them.
 const GAP: usize = 2;
 
@@ -82,13 +82,12 @@ pub(crate) fn table(columns: &[Column], rows: &[Vec<Cell>], width: Option<usize>
             }
             line.push_str("  ");
             let text = cell.fitted(*width, *cut);
-            let blank = " ".repeat(width.saturating_sub(text.chars().count()));
-            let (before, after) = if column.is_right {
-                (&*blank, "")
+            let padded = if column.is_right {
+                format!("{text:>width$}")
             } else {
-                ("", &*blank)
+                format!("{text:<width$}")
             };
-            line.extend([before, &text, after]);
+            line.push_str(&padded);
         }
         out.push_str(line.trim_end());
         out.push('\n');
@@ -152,23 +151,13 @@ fn middle(text: &str, width: usize, thirds: usize) -> String {
 /// Numbers over time as bars; a blank for 0.
 fn bars(numbers: &[u64], width: usize) -> String {
     let columns = numbers.len().clamp(1, width.clamp(1, MOST_BARS));
-    let part = |k: usize| {
-        let (from, to) = (
-            k * numbers.len() / columns,
-            (k + 1) * numbers.len() / columns,
-        );
-        numbers[from..to].iter().sum::<u64>()
-    };
-    let sums: Vec<u64> = (0..columns).map(part).collect();
-    let most = sums.iter().copied().max().unwrap_or(0).max(1);
+    let start = |part: usize| part * numbers.len() / columns;
+    let sum = |part| numbers[start(part)..start(part + 1)].iter().sum::<u64>();
+    let most = (0..columns).map(sum).max().unwrap_or(0).max(1);
     // Rounded up, so that a single message is a bar.
-    let eighth = |n: u64| {
-        usize::try_from((n.saturating_mul(8)).div_ceil(most))
-            .unwrap_or(8)
-            .min(8)
-    };
-    let bar = |n: u64| eighth(n).checked_sub(1).map_or(' ', |at| BARS[at]);
-    sums.into_iter().map(bar).collect()
+    let eighths = |n: u64| usize::try_from(n.saturating_mul(8).div_ceil(most)).unwrap_or(8);
+    let bar = |part| BARS[eighths(sum(part)).min(8)];
+    (0..columns).map(bar).collect()
 }
 
 /// `lead` and `text` on lines of at most `width` characters, broken at spaces; all lines but the first are indented by

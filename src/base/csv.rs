@@ -88,7 +88,9 @@ fn value(column: &TableColumn, at: usize, in_list: bool, to: &mut Vec<u8>) -> io
         ColumnValues::Floats(v) if !v[at].is_finite() => odd(v[at], in_list, to),
         ColumnValues::Floats(v) if column.kind == ColumnKind::F64 => number(v[at], to),
         ColumnValues::Floats(v) => write!(to, "{:?}", to_f32(v[at])),
-        ColumnValues::Texts(v) if column.kind == ColumnKind::Bytes => bytes(v.get(at), to),
+        ColumnValues::Texts(v) if column.kind == ColumnKind::Bytes => {
+            serde_json::to_writer(to, v.get(at)).map_err(io::Error::from)
+        }
         // Columns without unknown values are message fields.
         ColumnValues::Texts(v) => text(v.get(at), in_list, column.valid.is_none(), to),
         ColumnValues::Words(v) => text(v.get(at), in_list, column.valid.is_none(), to),
@@ -114,14 +116,6 @@ fn odd(value: f64, in_list: bool, to: &mut Vec<u8>) -> io::Result<()> {
         (false, _, true) => write!(to, "inf"),
         (false, _, false) => write!(to, "-inf"),
     }
-}
-
-fn bytes(bytes: &[u8], to: &mut Vec<u8>) -> io::Result<()> {
-    for (count, byte) in bytes.iter().enumerate() {
-        let before = if count == 0 { '[' } else { ',' };
-        write!(to, "{before}{byte}")?;
-    }
-    write!(to, "{}", if bytes.is_empty() { "[]" } else { "]" })
 }
 
 fn text(text: &[u8], in_list: bool, is_data: bool, to: &mut Vec<u8>) -> io::Result<()> {

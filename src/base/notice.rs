@@ -10,6 +10,8 @@ worded! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
     #[non_exhaustive]
     pub enum NoticeKind {
+        /// Recordings that are further apart than they are long, so that they are several runs. `check` refuses them.
+        Apart = "apart",
         /// Part of the bag was lost: cut, unreadable or skipped. The command exits 3.
         Damaged = "damaged",
         /// The bag's end is missing. The command exits 3.

@@ -47,14 +47,13 @@ fn ends_well(name: &str) -> bool {
 /// The start time in a name: `/x_PID_MILLISECONDS`, `/x_NANOSECONDS`.
 pub(crate) fn start(name: &str) -> Option<Stamp> {
     let (rest, number) = name.rsplit_once('_')?;
-    let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
     let process = rest.rsplit_once('_').map_or("", |(_, process)| process);
     let unit = match number.len() {
-        13 if digits(process) => 1_000_000,
+        13 if is_number(process) => 1_000_000,
         19 => 1,
         _ => return None,
     };
-    let number: i64 = number.parse().ok().filter(|_| digits(number))?;
+    let number: i64 = number.parse().ok().filter(|_| is_number(number))?;
     number.checked_mul(unit).map(Stamp)
 }
 

@@ -276,17 +276,6 @@ pub fn moment_rounded(nanos: i64) -> String {
     })
 }
 
-/// The UTC clock of a time since 1970, in nanoseconds: `14:03:22`.
-pub fn clock(nanos: i64) -> String {
-    let second = nanos.div_euclid(SECOND).rem_euclid(86_400);
-    format!(
-        "{:02}:{:02}:{:02}",
-        second / 3600,
-        second / 60 % 60,
-        second % 60
-    )
-}
-
 /// Date and zone of a time since 1970, in nanoseconds: `2024-05-03 UTC`; `None` for a time that is not of the calendar.
 pub fn date(nanos: i64) -> Option<String> {
     let time = of_calendar(nanos)?;
@@ -444,7 +433,6 @@ mod tests {
             (offset(-SECOND), "-00:01"),
             (offset_seconds(430_900_000_000), "07:10"),
             (offset_tenths(430_190_000_000), "07:10.1"),
-            (clock(50_602 * SECOND), "14:03:22"),
             (
                 date_and_clock(FIRST_OF_ROS).unwrap(),
                 "2007-01-01 00:00:00 UTC",

@@ -14,7 +14,7 @@ use crate::bag::Growth;
 use crate::base::error::Result;
 use crate::base::time::Period;
 use crate::export::Output;
-use crate::gate::{Expectation, FORMATS, judge};
+use crate::gate::FORMATS;
 use crate::graph::window::Length;
 use crate::mission::event_log::LogFormat;
 use crate::pipeline::follow::{Feed, FindingFeed, Follow};
@@ -97,8 +97,7 @@ struct Follower<'a> {
     follow: Follow,
     format: LogFormat,
     feed: Feed,
-    findings: FindingFeed,
-    expectation: Option<Expectation>,
+    findings: Option<FindingFeed>,
     job: Render,
     events: Pace,
     checks: Pace,
@@ -113,8 +112,7 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
     let outputs = args.outputs.iter().map(|o| Output::named(o, None));
     let job = Render::new(reading.clone(), outputs.collect::<Result<_>>()?)?;
     crate::pipeline::check_outputs(&job)?;
-    let expectation = args.expect.as_deref().map(crate::pipeline::expectation);
-    let expectation = expectation.transpose()?;
+    let findings = args.expect.as_deref().map(FindingFeed::new).transpose()?;
     let follow = Follow::new(reading, KEPT)?;
     if args.what.is_dir() && follow.path() != args.what {
         let newest = follow.path().display();
@@ -125,11 +123,10 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
     }
     let follower = Follower {
         args,
-        expectation: expectation.map(|(_, expectation)| expectation),
         follow,
         format: args.format,
         feed: Feed::default(),
-        findings: FindingFeed::default(),
+        findings,
         job,
         events: Pace::new(),
         checks: Pace::new(),
@@ -198,18 +195,14 @@ impl Follower<'_> {
 
     /// Prints new findings.
     fn print_findings(&mut self, terminal: &mut Terminal) -> Result<()> {
-        let Some(expectation) = &self.expectation else {
+        let Some(findings) = &mut self.findings else {
             return Ok(());
         };
-        let expected = expectation.period.map_or(Length::Auto, Length::Fixed);
-        let length = self.args.period.unwrap_or(expected);
-        let (follow, findings, format) = (&self.follow, &mut self.findings, self.format);
+        let length = self.args.period.unwrap_or(findings.length());
+        let (follow, format) = (&self.follow, self.format);
         let lines = self.checks.spend(terminal, || {
-            let Some(known) = follow.so_far(u64::MAX, length)? else {
-                return Ok(Vec::new());
-            };
-            let verdict = judge(expectation, &known.mission, false);
-            Ok(findings.new_lines(&verdict, known.now, format))
+            let known = follow.so_far(u64::MAX, length)?;
+            Ok(known.map_or_else(Vec::new, |known| findings.new_lines(&known, format)))
         });
         terminal.log(&lines?, format).map(drop)
     }

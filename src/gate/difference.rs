@@ -29,10 +29,10 @@ const PACE: i64 = 50;
 const SIGMAS: f64 = 3.0;
 /// The fraction by which the mean rate of an uneven topic may differ: such a topic depends on what happens in a run.
 const UNEVEN_CHANGE: f64 = 0.5;
+/// How many times the messages of a topic in one run are more than in another: what happens in a run makes less of a difference.
+const FAR: f64 = 4.0;
 /// The fewest messages of a topic whose first and last are compared: with fewer, silences do not show a rhythm.
 const FEWEST_OF_TIMES: u64 = 20;
-/// The longest silence of a topic, times this, is the uncertainty of its first and its last message.
-const SILENCES: i64 = 2;
 
 /// The two missions as given.
 #[derive(Clone, Debug)]
@@ -140,7 +140,35 @@ pub(crate) fn differences(first: &Mission, second: &Mission, rate_change: f64) -
     };
     all.retain(|d| !(d.kind == "event" && d.name.ends_with(" silent") && ends(d)));
     all.extend(times);
+    let counts = counts(facts, &all);
+    all.extend(counts);
     all
+}
+
+/// The topics of which one mission has far fewer messages than the other, unless a difference of the topic or of a publisher
+/// shows that. Pauses and bursts hide it in rates and times, as when a topic falls from 803 messages to 3.
+fn counts(facts: &[Facts<'_>; 2], known: &[Difference]) -> Vec<Difference> {
+    let theirs = topics(&facts[1]);
+    let own = topics(&facts[0]).into_iter().filter_map(|(name, first)| {
+        let both = [first, *theirs.get(name)?];
+        let is_reported = known.iter().any(|d| {
+            let mut publishers = both.iter().flat_map(TopicIn::publishers);
+            d.is_known && (d.element == name || publishers.any(|role| role == d.element))
+        });
+        let counts = both.map(|own| own.facts.messages(own.id));
+        let seconds = both.map(|own| own.facts.mission.span.nanos() as f64);
+        let [few, many] = if counts[0] as f64 / seconds[0] < counts[1] as f64 / seconds[1] {
+            [0, 1]
+        } else {
+            [1, 0]
+        };
+        // As many as the shorter recording would have of the other one.
+        let due = counts[many] as f64 * (seconds[few] / seconds[many]).min(1.0);
+        let is_far = due >= FEWEST_OF_MEAN as f64 && due > FAR * counts[few] as f64;
+        let texts = counts.map(|count| count.to_string());
+        (is_far && !is_reported).then(|| Difference::changed("messages", name, texts))
+    });
+    own.collect()
 }
 
 /// The nodes, topics and edges in only one mission, and the differences between those in both.
@@ -485,7 +513,7 @@ struct Sent<'a> {
     name: &'a str,
     facts: [&'a Facts<'a>; 2],
     received: [Span; 2],
-    /// The uncertainty of both times, in nanoseconds.
+    /// The uncertainty of both times, in nanoseconds: its longest silence.
     doubt: i64,
 }
 
@@ -535,7 +563,7 @@ impl<'a> Sent<'a> {
             name,
             facts: both.map(|own| own.facts),
             received: [first, second],
-            doubt: silences[0].max(silences[1]).saturating_mul(SILENCES),
+            doubt: silences[0].max(silences[1]),
         })
     }
 

@@ -22,12 +22,7 @@ const NODE: &str = "forbidden optional may_end known_by restarts lifecycle withi
 const TOPIC: &str = "forbidden optional may_end type by to hz mean_hz percent max_gap within age bytes drops latched qos \
     during";
 /// The keys that determine the form of a rule, each with the other allowed keys.
-const FORMS: [(&str, &str); 4] = [
-    ("node", NODE),
-    ("nodes", NODE),
-    ("topic", TOPIC),
-    ("changes", "during"),
-];
+const FORMS: [(&str, &str); 3] = [("nodes", NODE), ("topic", TOPIC), ("changes", "during")];
 
 /// A whole `graph.yaml`.
 #[derive(Clone, Debug, PartialEq)]
@@ -136,7 +131,6 @@ pub(crate) struct Entry {
     /// The time range in which rates and gaps are checked, or changes counted; the whole mission without it.
     pub(crate) during: Fact<During>,
     id: Fact<String>,
-    node: Fact<Pattern>,
     nodes: Fact<Names>,
     topic: Fact<Pattern>,
     changes: Fact<Range>,
@@ -160,6 +154,12 @@ impl Entry {
     /// The times in which an element may end, unless it may at any time.
     pub(crate) fn limit(&self) -> Fact<MayEnd> {
         Fact(self.may_end.filter(|limit| limit.value.0 != During::WHOLE))
+    }
+
+    /// Whether later windows leave the judgement of earlier ones as it is.
+    pub(crate) fn is_fixed(&self) -> bool {
+        let during = self.during.as_ref();
+        self.percent.is_none() && during.is_none_or(|during| during.value.is_fixed())
     }
 
     /// Whether so many of these windows may be out of range.
@@ -449,14 +449,9 @@ fn rule(At { at, value }: At<Keyed<Entry>>) -> Result<Rule, BadYaml> {
     } else if let Some(name) = entry.topic.0.take() {
         Demand::Topic(name, Box::new(entry))
     } else {
-        let names = entry.nodes.0.take().map(|names| names.value.0);
-        let names = entry
-            .node
-            .0
-            .take()
-            .into_iter()
-            .chain(names.into_iter().flatten());
-        Demand::Nodes(names.collect(), Box::new(entry))
+        let names = entry.nodes.0.take();
+        let names = names.map_or_else(Vec::new, |names| names.value.0);
+        Demand::Nodes(names, Box::new(entry))
     };
     Ok(Rule { id, at, demand })
 }
@@ -481,7 +476,7 @@ mod tests {
              topics:\n  /scan: {type: sensor_msgs/LaserScan, by: [/a], to: [/b], hz: 13.5..16.5, percent: 95, max_gap: 0.5s}\n\
              \x20 /map: {latched: true, hz: 1.., during: 5s..}\n\
              rules:\n  - {id: up, nodes: [/a, /b], within: ..20s}\n  - {id: drive, topic: /scan, hz: 10.., during: -30s..}\n\
-             \x20 - {id: flap, node: /nav/*, restarts: ..1}\n  - {id: quiet, during: -30s.., changes: ..0}\n",
+             \x20 - {id: flap, nodes: /nav/*, restarts: ..1}\n  - {id: quiet, during: -30s.., changes: ..0}\n",
         )
         .unwrap();
         assert_eq!(
@@ -524,16 +519,16 @@ mod tests {
             ),
             ("nodes: [/a]", "line 2, column 8: `nodes` is not a mapping"),
             ("nodes:\n  /a: {}\n  /a: {}", "line 4"),
-            ("rules:\n  - {node: /a, restarts: ..1}", "`id` is missing"),
+            ("rules:\n  - {nodes: /a, restarts: ..1}", "`id` is missing"),
             ("rules:\n  - {id: x}", "the rule has no subject"),
             (
-                "rules:\n  - {id: x, note: /a}",
-                "line 3, column 13: unknown key `note`; the nearest is `node`",
+                "rules:\n  - {id: x, node: /a}",
+                "line 3, column 13: unknown key `node`; the nearest is `nodes`",
             ),
-            ("rules:\n  - {id: x, node: /a}", "has no condition"),
+            ("rules:\n  - {id: x, nodes: /a}", "has no condition"),
             (
-                "rules:\n  - {id: x, node: /a, hz: 5..}",
-                "`hz` cannot be combined with `node`",
+                "rules:\n  - {id: x, nodes: /a, hz: 5..}",
+                "`hz` cannot be combined with `nodes`",
             ),
             (
                 "rules:\n  - {id: x, changes: ..0}\n  - {id: x, changes: ..0}",

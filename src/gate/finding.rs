@@ -223,6 +223,8 @@ pub struct Finding {
     pub accept: Option<String>,
     /// The number of earlier findings in the file with the same [`Self::fingerprint`] input.
     pub(crate) nth: usize,
+    /// Whether the rest of a recording that is not over may resolve it.
+    pub(crate) is_open: bool,
 }
 
 impl Finding {
@@ -247,6 +249,7 @@ impl Finding {
             help: Vec::new(),
             accept: None,
             nth: 0,
+            is_open: false,
         }
     }
 

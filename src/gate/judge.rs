@@ -5,7 +5,9 @@ mod topic;
 
 use std::cell::Cell;
 
-use super::expectation::{At, Demand, Entry, Expectation, Fact, Named, Rule, Unlisted, YamlPlace};
+use super::expectation::{
+    At, Demand, Entry, Expectation, Fact, Named, Rule, Unlisted, Within, YamlPlace,
+};
 use super::facts::Facts;
 use super::finding::{Cause, Finding, FindingKind, Severity, number};
 use super::values::{During, NamePatterns, Pattern, Range};
@@ -188,8 +190,10 @@ impl Judge<'_> {
                 self.topic_facts(&title, name, entry);
             }
         }
+        let (mission, is_part) = (self.facts.mission, self.is_part);
         for finding in self.found_since(before) {
             finding.accept = Some(name.to_string());
+            finding.is_open = is_open(finding, entry, mission, is_part);
         }
     }
 
@@ -246,8 +250,15 @@ impl Judge<'_> {
             }
         }
         let detail = format!("rule {}", words::visible(&rule.id));
+        let (mission, is_part) = (self.facts.mission, self.is_part);
         for finding in self.found_since(before) {
             finding.details.push(detail.clone());
+            finding.is_open = match &rule.demand {
+                Demand::Nodes(_, entry) | Demand::Topic(_, entry) => {
+                    is_open(finding, entry, mission, is_part)
+                }
+                Demand::Changes { .. } => true,
+            };
         }
     }
 
@@ -360,9 +371,10 @@ impl Judge<'_> {
             let text = sentence(mission, &parts, id, event);
             let name = topic.or(node).unwrap_or_default();
             let until = event.until.unwrap_or(event.time).plus(1);
-            Finding::new(finding, name, self.expectation.policy.at, text)
-                .severe(severity)
-                .at(Span::new(event.time, until))
+            let place = self.expectation.policy.at;
+            let mut found = Finding::new(finding, name, place, text).severe(severity);
+            found.is_open = kind == Kind::Starved;
+            found.at(Span::new(event.time, until))
         });
         found.collect()
     }
@@ -426,6 +438,40 @@ struct Subjects<'a, S> {
     title: &'a str,
     all: &'a [S],
     entry: &'a Entry,
+}
+
+/// Whether more of the same recording may resolve a finding about a name with these facts: what is missing may still come
+/// until the end of `within`, and only the end of the recording shows what has ended, a mean and the last state.
+fn is_open(finding: &Finding, entry: &Entry, part: &Mission, lacks_start: bool) -> bool {
+    let is_over = |within: &At<Within>| !lacks_start && within.value.0.is_over(part.span);
+    let is_early = |when: Span| {
+        // The last window may be cut, and one that is cut counts only until there are others.
+        let period = part.period.nanos();
+        when.start.plus(period) > part.span.end || when.nanos() < period
+    };
+    match finding.kind {
+        FindingKind::NodeForbidden
+        | FindingKind::TopicForbidden
+        | FindingKind::TopicType
+        | FindingKind::PublisherUnexpected => false,
+        FindingKind::NodeRestarted => entry.restarts.is_some_and(|most| most.value.from.is_some()),
+        FindingKind::NodeMissing
+        | FindingKind::NodeLate
+        | FindingKind::TopicMissing
+        | FindingKind::TopicLate => !entry.within.as_ref().is_some_and(is_over),
+        FindingKind::TopicGap => {
+            finding.when.is_none_or(|when| when.end >= part.span.end) || !entry.is_fixed()
+        }
+        FindingKind::TopicRateLow
+        | FindingKind::TopicRateHigh
+        | FindingKind::TopicAge
+        | FindingKind::TopicBytes
+        | FindingKind::TopicDrops => {
+            let is_mean = entry.mean_hz.is_some_and(|mean| mean.at == finding.place);
+            is_mean || !entry.is_fixed() || finding.when.is_none_or(is_early)
+        }
+        _ => true,
+    }
 }
 
 /// The absence of a node as a cause of findings.

@@ -206,6 +206,17 @@ impl During {
         self.to.is_some_and(|to| to.on(mission) > mission.end)
     }
 
+    /// Whether it ends at the same time however long a recording becomes, and has ended in this part of it.
+    pub(crate) fn is_over(&self, part: Span) -> bool {
+        self.is_fixed() && self.to.is_some_and(|to| to.on(part) < part.end)
+    }
+
+    /// Whether it means the same time however long a recording becomes.
+    pub(crate) fn is_fixed(&self) -> bool {
+        let mut ends = self.from.iter().chain(&self.to);
+        !ends.any(|moment| matches!(moment, Moment::BeforeEnd(_)))
+    }
+
     /// Parses a time range; `None` if it is not one or ends before it starts.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let [from, to] = ends(text, Moment::parse)?;

@@ -90,8 +90,7 @@ worded! {
     }
 }
 
-/// The exact difference between two graphs: [`apply`] of it to the first gives the second. Each list is sorted
-/// by element.
+/// The exact difference between two graphs: applied to the first it gives the second. Each list is sorted by element.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Diff {
     /// States of new elements.
@@ -100,13 +99,6 @@ pub struct Diff {
     pub removed: Vec<Element>,
     /// States before and after of elements that differ.
     pub changed: Vec<(ElementState, ElementState)>,
-}
-
-impl Diff {
-    /// Whether the graphs are equal.
-    pub fn is_empty(&self) -> bool {
-        *self == Self::default()
-    }
 }
 
 /// The difference from `before` to `after`.
@@ -125,17 +117,6 @@ pub fn diff(before: &Graph, after: &Graph) -> Diff {
     }
     diff.removed.extend(old.map(|gone| gone.what));
     diff
-}
-
-/// The result of applying `diff` to `before`.
-pub fn apply(before: &Graph, diff: &Diff) -> Graph {
-    let changed = diff.changed.iter().map(|(before, _)| before.what);
-    let gone: BTreeSet<Element> = diff.removed.iter().copied().chain(changed).collect();
-    let kept = before.states.iter().filter(|s| !gone.contains(&s.what));
-    let fresh = diff.changed.iter().map(|(_, after)| after);
-    let mut states: Vec<_> = kept.chain(&diff.added).chain(fresh).cloned().collect();
-    states.sort_by_key(|state| state.what);
-    Graph { states }
 }
 
 // Reconfigurations from differences: thresholds for rates, hand-overs, and hints from the evidence.

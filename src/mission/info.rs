@@ -20,6 +20,7 @@ pub(crate) use text::how_many;
 pub use text::text;
 pub use why::why;
 
+use crate::bag::Report;
 use crate::base::name::is_recorder;
 use crate::base::time::Stamp;
 use crate::base::words::visible_json;
@@ -34,7 +35,7 @@ pub struct Info {
     /// Always `bagreel.info/1`.
     pub schema: &'static str,
     /// The bags of the mission.
-    pub bags: Vec<BagInfo>,
+    pub bags: Vec<Report>,
     /// The first log time, ns since 1970.
     pub start_ns: i64,
     /// The last log time + 1 ns.
@@ -67,20 +68,6 @@ pub struct Info {
     pub undrawn: Vec<String>,
     /// Problems that did not stop the reading.
     pub notices: Vec<String>,
-}
-
-/// A bag of the mission.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[expect(missing_docs, reason = "`bag::Report` documents these fields")]
-pub struct BagInfo {
-    pub name: String,
-    pub format: String,
-    pub compression: Vec<String>,
-    pub tier: &'static str,
-    pub tier_reason: Option<String>,
-    pub complete: bool,
-    pub file_bytes: u64,
-    pub facts: Vec<(String, String)>,
 }
 
 /// The numbers of elements by their best confidence of evidence.
@@ -219,7 +206,7 @@ pub fn info(mission: &Mission) -> Info {
     });
     let mut info = Info {
         schema: "bagreel.info/1",
-        bags: bags(mission),
+        bags: mission.bags.clone(),
         start_ns: mission.span.start.0,
         end_ns: mission.span.end.0,
         duration_s: (mission.span.nanos() - 1).max(0) as f64 / 1e9,
@@ -257,20 +244,6 @@ pub fn json(value: &impl Serialize) -> String {
     // Only maps with keys that are not strings fail, and there are none.
     let json = serde_json::to_string_pretty(value).unwrap_or_default();
     visible_json(&json).into_owned() + "\n"
-}
-
-fn bags(mission: &Mission) -> Vec<BagInfo> {
-    let bags = mission.bags.iter().map(|bag| BagInfo {
-        name: bag.name.clone(),
-        format: bag.format.clone(),
-        compression: bag.compression.clone(),
-        tier: bag.tier.word(),
-        tier_reason: bag.tier_reason.clone(),
-        complete: bag.complete,
-        file_bytes: bag.file_bytes,
-        facts: bag.facts.clone(),
-    });
-    bags.collect()
 }
 
 /// The name of the evidence for unnamed publishers, which the summary counts per topic.

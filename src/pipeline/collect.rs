@@ -1,5 +1,7 @@
 //! Reads every bag once and gathers its evidence.
 
+use std::collections::BTreeMap;
+
 use super::inputs::{check_named, each_once, in_time, space_of};
 use super::{Reading, Watch};
 use crate::bag::straight::{self, ClockFall, Straightened, Watched};
@@ -80,6 +82,7 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
         recorded.cut(range, range.start <= whole.start)?;
     }
     recorded.notices.extend(twice);
+    recorded.notices.extend(gap(&recorded, &inputs));
     let offsets = recorded.offsets.iter();
     let apart = offsets.map(|offset| apart(offset, &inputs));
     recorded.notices.extend(apart);
@@ -108,6 +111,41 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
         recorded,
         range,
     })
+}
+
+/// The notice about the longest time between two recordings, if it is longer than all of them together: they are several runs.
+fn gap(recorded: &Recorded, inputs: &[Input]) -> Option<Notice> {
+    let mut spans: BTreeMap<usize, Span> = BTreeMap::new();
+    for stream in &recorded.streams {
+        if let Some((first, last)) = recorded.messages.bounds(stream.times) {
+            let own = Span::new(first, last);
+            let all = spans.entry(stream.bag).or_insert(own);
+            *all = all.hull(own);
+        }
+    }
+    let whole: i64 = spans.values().map(Span::nanos).sum();
+    let mut spans: Vec<(usize, Span)> = spans.into_iter().collect();
+    spans.sort_by_key(|(_, span)| span.start);
+    let mut before = *spans.first()?;
+    let mut longest: Option<(i64, usize, usize)> = None;
+    for (bag, span) in spans {
+        let gap = span.start.since(before.1.end);
+        if gap > whole && longest.is_none_or(|(other, ..)| gap > other) {
+            longest = Some((gap, before.0, bag));
+        }
+        if span.end > before.1.end {
+            before = (bag, span);
+        }
+    }
+    let (gap, before, after) = longest?;
+    let [before, after] = [before, after].map(|bag| inputs.get(bag).map(Input::name));
+    let text = format!(
+        "`{}` begins {} after `{}` ends, longer than the recordings are: give one run at a time, or two to `bagreel diff`",
+        after?,
+        words::duration(gap),
+        before?,
+    );
+    Some(Notice::new(NoticeKind::Apart, text))
 }
 
 /// The notice about recorders whose clocks differ: by the messages that two of them recorded, or by all of them.

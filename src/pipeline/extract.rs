@@ -10,11 +10,11 @@ use std::path::PathBuf;
 use super::inputs::each_once;
 use super::read::files;
 use super::{Stage, Watch};
-use crate::bag::{self, ConnectionId, Input, OpenOptions, Reader, Report, Sink, known_span};
+use crate::bag::{self, Bounds, Input, OpenOptions, Reader, Report, known_span};
 use crate::base::error::{Error, Result};
 use crate::base::name::TopicName;
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::time::{Moment, Span, Stamp};
+use crate::base::time::{Moment, Span};
 use crate::export::check::{check, check_folder, make_folder};
 use crate::export::tables::TableFormat;
 use crate::export::target::Target;
@@ -129,7 +129,7 @@ impl Extract {
     }
 
     fn measure(&self, watch: &mut dyn Watch) -> Result<Option<Span>> {
-        let mut bounds = Bounds(None);
+        let mut bounds = Bounds::default();
         for mut reader in self.open()? {
             reader.read(None, &mut bounds)?;
             stop(watch)?;
@@ -151,18 +151,4 @@ pub(super) fn of_report(report: &Report, notices: &Notices) -> Option<Notice> {
     use crate::base::notice::NoticeKind::Damaged;
     let silent = !report.complete && !notices.any_loss();
     silent.then(|| Notice::new(Damaged, format!("`{}` is not complete", report.name)))
-}
-
-/// The first and the last time of all messages.
-pub(super) struct Bounds(pub(super) Option<Span>);
-
-impl Sink for Bounds {
-    fn stamps(&mut self, _: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
-        for at in stamps {
-            let end = at.plus(1);
-            let span = self.0.get_or_insert(Span::new(*at, end));
-            span.start = span.start.min(*at);
-            span.end = span.end.max(end);
-        }
-    }
 }

@@ -158,12 +158,14 @@ fn of_steps(sheet: &FigureSheet<'_>, drawing: &Drawing) -> Result<Scene> {
         span.start.plus(span.nanos() / 2)
     };
     let many = source.phases.len();
-    let middles: Vec<Stamp> = (1..many - 1).map(middle).collect();
+    // In the only window, what begins could not be told from what is there from the start.
+    let base = usize::from(many == 2);
+    let middles: Vec<Stamp> = (1 - base..many - 1).map(middle).collect();
     let mission = source.mission.joined(&middles);
     let drawing = on_paper(sheet, drawing, sheet.options.width_mm);
     let whole = Composed::new(&mission, drawing.view.clone(), drawing.page.clone());
     let all: Vec<(usize, News)> = (1..many)
-        .filter_map(|k| Some((k, whole.view.news(k - 1)?)))
+        .filter_map(|k| Some((k, whole.view.news(k - 1 + base)?)))
         .collect();
     let mut chosen = chosen(sheet, &all)?;
     let mm = sheet.options.width_mm;

@@ -128,44 +128,18 @@ impl Fitting<'_> {
                 self.best.composed.page = page;
             }
         }
-        if !self.is_readable() && !self.options().mode.is_direct() {
-            self.show(ViewOptions {
-                mode: Mode::Nodes,
-                is_bundled: true,
-                ..self.options().clone()
-            });
-            self.take_higher_page();
-        }
-        if !self.is_readable() && self.options().is_bundled {
-            self.show(ViewOptions {
-                counts_rows: true,
-                ..self.options().clone()
-            });
-            self.take_higher_page();
-        }
-        if !self.is_readable() && self.options().is_still == Some(true) {
-            // One box for the nodes of a namespace that are there in the same phases.
-            let phases = self.mission.log.phases.iter().map(|phase| phase.span);
-            self.show(ViewOptions {
-                alike_in: phases.collect(),
-                ..self.options().clone()
-            });
-            self.take_higher_page();
-        }
-        if !self.is_readable() {
-            self.show(ViewOptions {
-                are_leaves_in_words: true,
-                ..self.options().clone()
-            });
-            self.take_higher_page();
-        }
-        if !self.is_readable() && self.options().is_bundled {
-            self.show(ViewOptions {
-                are_unlinked_in_words: true,
-                ..self.options().clone()
-            });
-            self.take_higher_page();
-        }
+        self.show_if(!self.options().mode.is_direct(), |own| {
+            own.mode = Mode::Nodes;
+            own.is_bundled = true;
+        });
+        self.show_if(self.options().is_bundled, |own| own.counts_rows = true);
+        // One box for the nodes of a namespace that are there in the same phases.
+        let phases = self.mission.log.phases.iter().map(|phase| phase.span);
+        self.show_if(self.options().is_still == Some(true), |own| {
+            own.alike_in = phases.collect();
+        });
+        self.show_if(true, |own| own.are_leaves_in_words = true);
+        self.show_if(self.options().is_bundled, |own| own.are_unlinked_in_words = true);
         let spared = self.collapse_the_steady();
         self.collapse_the_rest(spared);
         if self.is_readable() {
@@ -175,6 +149,16 @@ impl Fitting<'_> {
             self.bundle();
         }
         self.take_lower_page();
+    }
+
+    /// Changes what is shown and takes a higher page, where something is not legible yet and this applies.
+    fn show_if(&mut self, applies: bool, change: impl FnOnce(&mut ViewOptions)) {
+        if applies && !self.is_readable() {
+            let mut options = self.options().clone();
+            change(&mut options);
+            self.show(options);
+            self.take_higher_page();
+        }
     }
 
     /// Takes the lowest page of a purpose on which everything is legible, else the highest if its text is larger.

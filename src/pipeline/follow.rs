@@ -18,8 +18,7 @@ use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::collector::Collector;
 use crate::graph::window::Length;
 use crate::mission::Mission;
-pub use feed::Feed;
-pub(crate) use feed::FindingFeed;
+pub use feed::{Feed, FindingFeed};
 
 /// A growing recording and what has been collected from it.
 pub struct Follow {
@@ -41,6 +40,13 @@ pub struct SoFar {
     pub from: Stamp,
     /// The time of the newest message.
     pub now: Stamp,
+}
+
+impl SoFar {
+    /// Whether earlier messages of the recording were dropped.
+    fn is_part(&self) -> bool {
+        self.from > Stamp::MIN
+    }
 }
 
 impl Follow {
@@ -111,7 +117,7 @@ impl Follow {
         let share = (most as f64 / count.max(1) as f64).min(1.0);
         let kept = cast::to_i64(last.since(first) as f64 * share);
         let newest = (share < 1.0).then(|| last.plus(-kept));
-        let from = newest.or(self.forgotten).unwrap_or(Stamp(i64::MIN));
+        let from = newest.or(self.forgotten).unwrap_or(Stamp::MIN);
         let recorded = self.collector.so_far(from)?;
         let Some(span) = recorded.span else {
             return Ok(None);

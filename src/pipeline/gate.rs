@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use super::{Body, Drawing, Reading, Render, Watch, read, show};
 use crate::bag::Input;
 use crate::base::error::{Error, Result};
+use crate::base::notice::NoticeKind;
 use crate::base::time::Period;
 use crate::base::{budget, file, words};
 use crate::export::Output;
@@ -153,6 +154,9 @@ pub fn check(job: &Check, watch: &mut dyn Watch) -> Result<Checked> {
     check_targets(&targets, &kept)?;
     let reading = in_windows(&job.reading, expectation.period);
     let mission = read(&reading, watch)?;
+    if let Some(apart) = mission.notices.iter().find(|n| n.kind == NoticeKind::Apart) {
+        return Err(Error::usage(apart.text, "`check` judges one run"));
+    }
     let mut verdict = judge(&expectation, &mission, is_part(&reading));
     if job.is_strict {
         verdict.decide();

@@ -9,11 +9,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
 use std::thread;
-use std::time::SystemTime;
 
 use super::survey::{alone, recordings};
 use super::{Stage, Watch};
-use crate::bag::Recording;
+use crate::bag::{Recording, written};
 use crate::base::error::{Error, Result};
 use crate::base::file::with_suffix;
 use crate::base::notice::{Notice, NoticeKind, Notices};
@@ -216,20 +215,9 @@ impl Listed {
 
     /// Whether its table is newer than its files.
     fn is_tabled(&self) -> bool {
-        let changed = self
-            .recording
-            .paths()
-            .iter()
-            .map(|path| changed(path))
-            .max();
+        let changed = self.recording.paths().iter().map(|path| written(path));
+        let changed = changed.max();
         let tabled = fs::metadata(&self.file).and_then(|file| file.modified());
         tabled.is_ok_and(|tabled| changed.flatten().is_some_and(|changed| changed <= tabled))
     }
-}
-
-/// The modification time of a file, or of the newest in a folder.
-fn changed(path: &Path) -> Option<SystemTime> {
-    let inside = fs::read_dir(path).into_iter().flatten().flatten();
-    let inside = inside.filter_map(|file| fs::metadata(file.path()).ok()?.modified().ok());
-    inside.chain(fs::metadata(path).ok()?.modified()).max()
 }

@@ -1,18 +1,21 @@
 //! Tests of following in one process: the mission collected from a growing recording equals that of the
 //! closed one byte for byte, and so do the printed lines, even if the follower or the recorder was killed.
 
+use std::ffi::OsStr;
+use std::io::Write as _;
 use std::path::Path;
+use std::process::Command;
 
 use bagreel::commands::{LogFormat, LogOptions, log};
 use bagreel::internals::base::notice::Notices;
 use bagreel::internals::base::time::Period;
 use bagreel::internals::graph::window::Length;
 use bagreel::internals::mission::{Mission, write_json};
-use bagreel::internals::pipeline::follow::{Feed, Follow, Growth};
+use bagreel::internals::pipeline::follow::{Feed, FindingFeed, Follow, Growth};
 use bagreel::internals::pipeline::{Reading, Unwatched, read};
 use tempfile::TempDir;
 
-use super::recorders::{Chance, EXAMPLES, RECORDERS, Recorder};
+use super::recorders::{Chance, EXAMPLES, RECORDERS, Recorder, active};
 
 /// A line of the log without time, rates, and length of a silence, which are more precise at the end, as is whether the
 /// first message of a topic is a beginning.
@@ -153,6 +156,94 @@ fn the_followed_mission_equals_the_closed_recording() {
             scope.spawn(move || (0..2).for_each(|seed| holds(name, what, *recorder, seed)));
         }
     });
+}
+
+/// The lines about findings of a growing copy of a bag.
+fn found(bag: &Path, expect: &Path) -> Vec<String> {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join(bag.file_name().unwrap());
+    let bytes = std::fs::read(bag).unwrap();
+    let is_rosbag = bytes.starts_with(b"#ROSBAG");
+    let mut findings = FindingFeed::new(expect).unwrap();
+    let length = findings.length();
+    let (mut follow, mut printed) = (None, Vec::new());
+    for step in 1..=STEPS {
+        let cut = bytes.len() * step / STEPS;
+        let now = if cut < bytes.len() && is_rosbag {
+            active(&bytes, cut)
+        } else {
+            bytes[..cut].to_vec()
+        };
+        // As by a recorder, in the same file.
+        let mut file = std::fs::OpenOptions::new();
+        let file = file.create(true).truncate(false).write(true).open(&path);
+        file.unwrap().write_all(&now).unwrap();
+        let forever = Period::from_nanos(i64::MAX).unwrap();
+        follow = follow.or_else(|| Follow::new(reading(&path), forever).ok());
+        let Some(follow) = &mut follow else { continue };
+        while follow.poll().unwrap() == Growth::More {}
+        if let Some(known) = follow.so_far(u64::MAX, length).unwrap() {
+            let lines = findings.new_lines(&known, LogFormat::Text);
+            printed.extend(
+                lines
+                    .iter()
+                    .map(|line| format!("{step}: {}", line.text(None))),
+            );
+        }
+    }
+    printed
+}
+
+/// The parts in which a recording grows.
+const STEPS: usize = 60;
+
+#[test]
+fn following_a_healthy_run_prints_no_finding() {
+    let project = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let (examples, shared) = (project.join("examples"), project.join("../shared/data"));
+    let bags = [
+        examples.join("warehouse.bag"),
+        examples.join("courier.mcap"),
+        shared.join("mini/mini_late.bag"),
+        shared.join("mini/mini_bz2.bag"),
+        shared.join("bags/mission/mission.bag"),
+        shared.join("bags/paper/turtlesim.bag"),
+        shared.join("bags/derived/mission_ros1_lz4.mcap"),
+        shared.join("inspect/inspect.bag"),
+    ];
+    std::thread::scope(|scope| {
+        for bag in bags.iter().filter(|bag| bag.exists()) {
+            scope.spawn(move || {
+                let folder = TempDir::new().unwrap();
+                let own = folder.path().join("graph.yaml");
+                let args = [
+                    OsStr::new("baseline"),
+                    bag.as_os_str(),
+                    OsStr::new("-o"),
+                    own.as_os_str(),
+                ];
+                let done = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+                    .args(args)
+                    .output();
+                assert!(done.unwrap().status.success());
+                assert_eq!(found(bag, &own), [""; 0], "{}", bag.display());
+            });
+        }
+    });
+}
+
+#[test]
+fn what_is_missing_is_printed_once_its_time_is_over() {
+    let bag = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag");
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("graph.yaml");
+    let text = "schema: bagreel.expect/1\ntopics:\n  /lost: {within: ..5s}\n  /later: {}\n";
+    std::fs::write(&file, text).unwrap();
+    let lines = found(&bag, &file);
+    assert!(
+        lines.len() == 1 && lines[0].contains("/lost is not in the bag"),
+        "{lines:?}"
+    );
 }
 
 /// `cargo test --release --test tests follow::law -- --ignored --nocapture`

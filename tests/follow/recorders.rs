@@ -171,7 +171,7 @@ fn rosbag(how: Pack, folder: &Path, chance: &mut Chance, step: Step<'_>) -> Opti
 }
 
 /// The first `cut` bytes of a bag while it is recorded.
-fn active(bytes: &[u8], cut: usize) -> Vec<u8> {
+pub(super) fn active(bytes: &[u8], cut: usize) -> Vec<u8> {
     let number = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
     let mut now = bytes.to_vec();
     let index = bytes.windows(10).position(|w| w == b"index_pos=").unwrap() + 10;

@@ -169,3 +169,100 @@ fn topics_that_begin_or_end_at_another_time_or_send_less_differ_also_on_the_page
         assert_eq!(html.contains("compares paired"), !is_same, "{name}");
     }
 }
+
+/// How a topic differs in a second run: which of its messages remain, by their number and their share of its life.
+type Fault = (&'static str, fn(usize, f64) -> bool);
+
+const FAULTS: &[Fault] = &[
+    ("removed", |_, _| false),
+    ("three messages", |n, _| n < 3),
+    ("halved", |n, _| n % 2 == 0),
+    ("late", |_, share| share > 0.3),
+    ("gap", |_, share| !(0.4..0.6).contains(&share)),
+    ("dies", |_, share| share < 0.6),
+    ("one in ten", |n, _| n % 10 == 0),
+];
+
+/// A recording whose topics send evenly, rarely, in bursts, and with a long pause.
+fn rhythms() -> Recording {
+    let mut all = Recording::default();
+    let mut topic = |name: &str, parts: &[(i64, i64)], period: i64| {
+        let node = format!("/node{name}").replace("/node/", "/of_");
+        let place = all.publisher(&node, name, "std_msgs/String");
+        for part in parts {
+            all.send(place, *part, period, b"\x05\0\0\0hello");
+        }
+    };
+    topic("/steady", &[(0, 120_000)], 50);
+    topic("/even", &[(500, 120_000)], 100);
+    topic("/slow", &[(900, 120_000)], 1000);
+    let bursts: Vec<(i64, i64)> = (0..8)
+        .map(|n| (n * 15_000 + 700, n * 15_000 + 2700))
+        .collect();
+    topic("/bursts", &bursts, 50);
+    let uneven = [
+        (3000, 9000),
+        (11_000, 12_000),
+        (40_000, 71_000),
+        (75_000, 76_500),
+        (99_000, 118_000),
+    ];
+    topic("/uneven", &uneven, 70);
+    topic("/paused", &[(1000, 30_000), (60_000, 119_000)], 100);
+    all
+}
+
+#[test]
+fn what_check_finds_with_a_baseline_of_a_run_diff_finds_too() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let healthy = rhythms();
+    bag(here, "a.bag", &healthy);
+    run(here, &["baseline", "a.bag", "-o", "graph.yaml"]);
+    // Each node of a healthy run is up to a second late.
+    let mut again = rhythms();
+    for (of, time, _) in &mut again.messages {
+        *time += i64::try_from(*of).unwrap() * 150_000_000;
+    }
+    bag(here, "again.bag", &again);
+    let (code, said) = run(here, &["diff", "a.bag", "again.bag"]);
+    assert_eq!(code, 0, "{said}");
+    let mut missed = Vec::new();
+    for (number, publisher) in healthy.publishers.iter().enumerate().skip(1) {
+        let own = healthy.messages.iter().filter(|m| m.0 == number);
+        let times: Vec<i64> = own.map(|m| m.1).collect();
+        let (first, life) = (times[0], (times[times.len() - 1] - times[0]) as f64);
+        for (fault, keeps) in FAULTS {
+            let mut other = rhythms();
+            let mut nth = 0;
+            other.messages.retain(|(of, time, _)| {
+                nth += usize::from(*of == number);
+                *of != number || keeps(nth - 1, (time - first) as f64 / life)
+            });
+            bag(here, "b.bag", &other);
+            let read = |args: &[&str]| -> serde_json::Value {
+                run(here, &[args, &["-o", "r.json"]].concat());
+                serde_json::from_slice(&fs::read(here.join("r.json")).unwrap()).unwrap()
+            };
+            let names = |json: &serde_json::Value| -> Vec<String> {
+                let rows = json.as_array().into_iter().flatten();
+                rows.map(|row| row["name"].as_str().unwrap().to_owned())
+                    .collect()
+            };
+            let checked = read(&["check", "b.bag", "--expect", "graph.yaml"]);
+            let rules = checked["rules"].as_array().unwrap().iter();
+            let found: Vec<String> = rules.flat_map(|rule| names(&rule["findings"])).collect();
+            let differs = names(&read(&["diff", "a.bag", "b.bag"])["differences"]);
+            let topic = publisher.topic.as_str();
+            let is_named = |names: &[String]| {
+                names
+                    .iter()
+                    .any(|name| name.contains(topic) || name.contains(&publisher.node))
+            };
+            if is_named(&found) && !is_named(&differs) {
+                missed.push(format!("{topic} {fault}: {found:?}"));
+            }
+        }
+    }
+    assert_eq!(missed, [""; 0]);
+}

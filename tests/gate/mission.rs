@@ -14,20 +14,20 @@ nodes:
   /probe: {}
   /camera_backup: {}
 rules:
-  - {id: localizer-starts, node: /localizer, within: 1s}
-  - {id: planner-starts, node: /planner, within: 50s}
-  - {id: controller-starts, node: /controller, within: 80s}
-  - {id: backup-starts, node: /camera_backup, within: 100s}
-  - {id: probe-starts, node: /probe, within: 160s}
-  - {id: planner-restarts, node: /planner, restarts: ..0}
-  - {id: probe-restarts, node: /probe, restarts: ..0}
-  - {id: successor-starts, node: /controller_v2, within: 200s}
-  - {id: joystick-starts, node: /joystick, within: 200s}
-  - {id: localizer-restarts, node: /localizer, restarts: ..0}
+  - {id: localizer-starts, nodes: /localizer, within: 1s}
+  - {id: planner-starts, nodes: /planner, within: 50s}
+  - {id: controller-starts, nodes: /controller, within: 80s}
+  - {id: backup-starts, nodes: /camera_backup, within: 100s}
+  - {id: probe-starts, nodes: /probe, within: 160s}
+  - {id: planner-restarts, nodes: /planner, restarts: ..0}
+  - {id: probe-restarts, nodes: /probe, restarts: ..0}
+  - {id: successor-starts, nodes: /controller_v2, within: 200s}
+  - {id: joystick-starts, nodes: /joystick, within: 200s}
+  - {id: localizer-restarts, nodes: /localizer, restarts: ..0}
   - {id: quiet-at-end, during: -30s.., changes: ..0}
   - {id: kept-takeover, topic: /image_small, by: [/camera_driver, /camera_backup]}
   - {id: kept-rate, topic: /scan_small, hz: 4..6}
-  - {id: kept-restarts, node: /probe, restarts: ..1}
+  - {id: kept-restarts, nodes: /probe, restarts: ..1}
 ";
 
 #[test]
@@ -93,16 +93,16 @@ nodes:
   /planner: {optional: true}
   /probe: {optional: true}
 rules:
-  - {id: localizer-starts, node: /localizer, forbidden: true}
-  - {id: planner-starts, node: /planner, forbidden: true}
-  - {id: controller-starts, node: /controller, forbidden: true}
-  - {id: backup-starts, node: /camera_backup, forbidden: true}
-  - {id: probe-starts, node: /probe, forbidden: true}
-  - {id: planner-restarts, node: /planner, restarts: ..0}
-  - {id: probe-restarts, node: /probe, restarts: ..0}
-  - {id: successor-starts, node: /controller_v2, forbidden: true}
-  - {id: joystick-starts, node: /joystick, forbidden: true}
-  - {id: localizer-restarts, node: /localizer, restarts: ..0}
+  - {id: localizer-starts, nodes: /localizer, forbidden: true}
+  - {id: planner-starts, nodes: /planner, forbidden: true}
+  - {id: controller-starts, nodes: /controller, forbidden: true}
+  - {id: backup-starts, nodes: /camera_backup, forbidden: true}
+  - {id: probe-starts, nodes: /probe, forbidden: true}
+  - {id: planner-restarts, nodes: /planner, restarts: ..0}
+  - {id: probe-restarts, nodes: /probe, restarts: ..0}
+  - {id: successor-starts, nodes: /controller_v2, forbidden: true}
+  - {id: joystick-starts, nodes: /joystick, forbidden: true}
+  - {id: localizer-restarts, nodes: /localizer, restarts: ..0}
 ";
 
 /// An end of the mission in seconds: the rules newly broken there, and those no longer broken.

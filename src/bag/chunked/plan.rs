@@ -5,7 +5,8 @@ use std::ops::Range;
 
 use super::index::IndexSum;
 use super::record::Connections;
-use crate::bag::model::{ConnectionId, Sink};
+use crate::bag::adapters::Bounds;
+use crate::bag::model::Sink;
 use crate::base::time::{Span, Stamp};
 
 /// A chunk as the tail describes it. Sums of its numbers do not overflow.
@@ -76,9 +77,9 @@ impl ChunkPlan {
     /// they are few or one of these two has other times than stated.
     pub(super) fn spans(&self, read: impl Fn(&Chunk, &mut dyn Sink)) -> Vec<(usize, Span)> {
         let seen = |(at, chunk): &(usize, &Chunk)| {
-            let mut seen = Extremes::default();
+            let mut seen = Bounds::default();
             read(chunk, &mut seen);
-            Some((*at, seen.span()?))
+            Some((*at, seen.0?))
         };
         let full = self.chunks.iter().enumerate();
         let full: Vec<(usize, &Chunk)> = full.filter(|(_, c)| c.holds_messages()).collect();
@@ -162,25 +163,5 @@ impl Used {
             return Ok(());
         }
         Unindexed::wrong("its index counts messages of undescribed connections")
-    }
-}
-
-/// A sink that keeps only the first and the last stamp.
-#[derive(Default)]
-struct Extremes(Option<(Stamp, Stamp)>);
-
-impl Extremes {
-    fn span(&self) -> Option<Span> {
-        let (start, last) = self.0?;
-        Some(Span::new(start, last.plus(1)))
-    }
-}
-
-impl Sink for Extremes {
-    fn stamps(&mut self, _: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
-        for at in stamps {
-            let (first, last) = self.0.unwrap_or((*at, *at));
-            self.0 = Some((first.min(*at), last.max(*at)));
-        }
     }
 }

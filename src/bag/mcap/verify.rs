@@ -1,6 +1,6 @@
 //! An MCAP file read a second time by an independent reader, the crate `mcap`, with all checksums.
 
-use std::io::{self, Read};
+use std::io::{self, Read as _};
 
 use mcap::records::{Record, op};
 use mcap::sans_io::decompressor::{DecompressResult, Decompressor};
@@ -79,14 +79,14 @@ fn bound_chunk(stream: &mut ByteStream<'_>, len: u64) -> Result<(), String> {
 
 fn records_of(
     reader: &mut LinearReader,
-    from: &mut dyn Read,
+    from: &mut ByteStream<'_>,
     found: &mut SecondFinds<'_, Mcap>,
 ) -> Result<(), String> {
     while let Some(event) = reader.next_event() {
         match event.map_err(|e| e.to_string())? {
             LinearReadEvent::ReadRequest(n) => {
                 // Memory grows with the bytes received, not with the bytes requested.
-                let got = read_some(from, reader.insert(n.min(1 << 20)));
+                let got = from.read(reader.insert(n.min(1 << 20)));
                 reader.notify_read(got.map_err(|e| e.to_string())?);
             }
             LinearReadEvent::Record { data, opcode } => record(opcode, data, found)?,
@@ -133,13 +133,4 @@ impl Decompressor for ZstdPieces {
 
 fn failed(error: &io::Error) -> McapError {
     McapError::DecompressionError(error.to_string())
-}
-
-fn read_some(from: &mut dyn Read, into: &mut [u8]) -> io::Result<usize> {
-    loop {
-        match from.read(into) {
-            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-            other => return other,
-        }
-    }
 }

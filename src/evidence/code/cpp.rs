@@ -361,9 +361,12 @@ impl<'a> CppReader<'a> {
             self.classes.current().mentions.insert(class, Some(name));
         }
         // A filter is constructed without a topic and subscribes later.
-        if let ("subscribe", Some(kind)) = (callee.name, self.members.get(callee.object))
-            && let Some((made, inner)) = by_constructor(self.text(*kind))
-        {
+        let kind = match (callee.name, self.members.get(callee.object)) {
+            ("subscribe", Some(kind)) => self.text(*kind),
+            ("make_shared" | "make_unique", _) => callee.template,
+            _ => "",
+        };
+        if let Some((made, inner)) = by_constructor(kind) {
             let types = self.names.types(inner);
             self.declare(node, made, &given, types, "");
         } else if let Some(made) = by_function(&callee) {
@@ -377,11 +380,6 @@ impl<'a> CppReader<'a> {
                 .cloned()
                 .unwrap_or_else(|| namespace_hint(callee.object).to_owned());
             self.declare(node, made, &given, types, &space);
-        } else if let ("make_shared" | "make_unique", template) = (callee.name, callee.template)
-            && let Some((made, inner)) = by_constructor(template)
-        {
-            let types = self.names.types(inner);
-            self.declare(node, made, &given, types, "");
         }
     }
 

@@ -46,10 +46,10 @@ pub(super) fn evaluate(expression: &str, names: &BTreeMap<String, String>) -> Op
     match value(expression, names)? {
         // XML puts quotes around the whole expression.
         Text(text) => match value(&text, names) {
-            Some(Bool(is_true)) => Some(word(is_true)),
+            Some(Bool(is_true)) => Some(is_true.to_string()),
             _ => Some(text).filter(|text| !text.contains("$(")),
         },
-        Bool(is_true) => Some(word(is_true)),
+        Bool(is_true) => Some(is_true.to_string()),
         other => other.text(),
     }
 }
@@ -65,10 +65,6 @@ fn value(expression: &str, names: &BTreeMap<String, String>) -> Option<PythonVal
 /// A value that is only known at run time.
 fn unknown(at: Node<'_>) -> PythonValue {
     Unknown(line(at))
-}
-
-fn word(is_true: bool) -> String {
-    if is_true { "true" } else { "false" }.to_owned()
 }
 
 // Statements.

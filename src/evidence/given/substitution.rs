@@ -59,7 +59,7 @@ impl SubstitutionContext<'_> {
             .split_once(' ')
             .map(|(_, text)| unquoted(text).to_owned());
         let both = |f: fn(&str, &str) -> bool| match parts[..] {
-            [a, b] => Some(truth(f(a, b))),
+            [a, b] => Some(f(a, b).to_string()),
             _ => None,
         };
         match verb {
@@ -75,7 +75,7 @@ impl SubstitutionContext<'_> {
             "not-equals" => both(|a, b| a != b),
             "and" => both(|a, b| is_true(a) && is_true(b)),
             "or" => both(|a, b| is_true(a) || is_true(b)),
-            "not" => Some(truth(!is_true(words))),
+            "not" => Some((!is_true(words)).to_string()),
             _ => None,
         }
     }
@@ -84,10 +84,6 @@ impl SubstitutionContext<'_> {
 /// Whether the text of a condition is true, as in ROS 1 and ROS 2.
 pub(super) fn is_true(text: &str) -> bool {
     ["true", "1", "yes", "on"].contains(&&*text.trim().to_lowercase())
-}
-
-fn truth(is_true: bool) -> String {
-    if is_true { "true" } else { "false" }.to_owned()
 }
 
 /// A text without the quotes around it.

@@ -154,7 +154,7 @@ impl Work<'_> {
             }
             // One that is in some of the runs is optional.
             FindingKind::NodeMissing | FindingKind::TopicMissing if lines.contains_key(name) => {
-                self.text.set(section, name, "optional", "true")
+                self.text.write(section, name, "optional", Some("true"))
             }
             FindingKind::NodeMissing
             | FindingKind::TopicMissing
@@ -165,7 +165,7 @@ impl Work<'_> {
             | FindingKind::NodeRestarted
             | FindingKind::NodeLifecycle => {
                 let value = self.of_node(name, key);
-                self.write("nodes", name, key, value)
+                self.text.write("nodes", name, key, value.as_deref())
             }
             FindingKind::TopicRateLow | FindingKind::TopicRateHigh => {
                 let mut topics = self.expectation.topics.iter();
@@ -184,8 +184,8 @@ impl Work<'_> {
                 self.let_end(name)
             }
             FindingKind::TopicQos => {
-                self.text.unset("topics", name, "qos")?;
-                self.text.unset("topics", name, "latched")
+                self.text.write("topics", name, "qos", None)?;
+                self.text.write("topics", name, "latched", None)
             }
             _ => self.write_topic(name, key),
         }
@@ -193,20 +193,7 @@ impl Work<'_> {
 
     fn write_topic(&mut self, name: &str, key: &str) -> Result<(), BadYaml> {
         let value = self.of_topic(name, key);
-        self.write("topics", name, key, value)
-    }
-
-    fn write(
-        &mut self,
-        section: &str,
-        name: &str,
-        key: &str,
-        value: Option<String>,
-    ) -> Result<(), BadYaml> {
-        match value {
-            Some(value) => self.text.set(section, name, key, &value),
-            None => self.text.unset(section, name, key),
-        }
+        self.text.write("topics", name, key, value.as_deref())
     }
 
     /// The value of a node's key common to all runs; for a pattern, common to all matching nodes.
@@ -294,7 +281,7 @@ impl Work<'_> {
     /// Lets a topic end that ended in these runs: its rate and gaps are checked until then.
     fn let_end(&mut self, name: &str) -> Result<(), BadYaml> {
         match self.ended(name) {
-            Some(value) => self.text.set("topics", name, "may_end", &value),
+            Some(value) => self.text.write("topics", name, "may_end", Some(&value)),
             None => Ok(()),
         }
     }
@@ -305,30 +292,27 @@ impl Work<'_> {
 struct EditedText(String);
 
 impl EditedText {
-    /// Sets `key` of an entry to `value`, both as YAML; does nothing without such an entry.
-    fn set(&mut self, section: &str, entry: &str, key: &str, value: &str) -> Result<(), BadYaml> {
+    /// Sets `key` of an entry to `value`, both as YAML, or removes it; does nothing without such an entry.
+    fn write(
+        &mut self,
+        section: &str,
+        entry: &str,
+        key: &str,
+        value: Option<&str>,
+    ) -> Result<(), BadYaml> {
         let whole: YamlNode = yaml::read(&self.0)?;
         let Some(pair) = find(&whole, section).and_then(|s| find(&s.value, entry)) else {
             return Ok(());
         };
-        match (&pair.value.data, find(&pair.value, key)) {
-            (_, Some(own)) => self.replace(own, value),
-            (YamlData::Map(pairs), None) => self.add(&pair.value, pairs, key, value),
-            _ => {
+        match (&pair.value.data, find(&pair.value, key), value) {
+            (_, Some(own), Some(value)) => self.replace(own, value),
+            (_, Some(own), None) => self.remove(&pair.value, own),
+            (YamlData::Map(pairs), None, Some(value)) => self.add(&pair.value, pairs, key, value),
+            (_, None, Some(value)) => {
                 let colon = self.after_key(pair);
                 self.0.insert_str(colon, &format!(" {{{key}: {value}}}"));
             }
-        }
-        Ok(())
-    }
-
-    /// Removes `key` of an entry.
-    fn unset(&mut self, section: &str, entry: &str, key: &str) -> Result<(), BadYaml> {
-        let whole: YamlNode = yaml::read(&self.0)?;
-        if let Some(entry) = find(&whole, section).and_then(|s| find(&s.value, entry))
-            && let Some(pair) = find(&entry.value, key)
-        {
-            self.remove(&entry.value, pair);
+            (_, None, None) => {}
         }
         Ok(())
     }
@@ -358,14 +342,11 @@ impl EditedText {
             self.insert_line(end, &format!("  {key}: {value}\n"));
             return Ok(());
         };
-        let (Some(first), Some(last)) = (pairs.first(), pairs.last()) else {
+        let ends = pairs.first().zip(pairs.last());
+        let Some((first, last)) = ends.filter(|_| !self.is_flow(&part.value)) else {
             self.add(&part.value, pairs, key, value);
             return Ok(());
         };
-        if self.is_flow(&part.value) {
-            self.add(&part.value, pairs, key, value);
-            return Ok(());
-        }
         let next = pairs.iter().find(|pair| pair.key.as_str() > entry);
         let line = format!("{}{key}: {value}\n", self.indent(first));
         let at = match next {
@@ -524,7 +505,8 @@ topics:
 
     #[test]
     fn only_the_value_is_changed() {
-        let topic = |name, key, value| move |t: &mut EditedText| t.set("topics", name, key, value);
+        let topic =
+            |name, key, value| move |t: &mut EditedText| t.write("topics", name, key, Some(value));
         replaces(topic("/scan", "hz", "5..6"), "9..11", "5..6");
         replaces(topic("/scan", "by", "[/z]"), "[/a, \"/b: x\"]", "[/z]");
         replaces(topic("/block", "hz", "5..6"), "1..2", "5..6");
@@ -534,12 +516,12 @@ topics:
 
     #[test]
     fn keys_are_added_to_entries_with_or_without_keys() {
-        let ends = |name| move |t: &mut EditedText| t.set("nodes", name, "may_end", "true");
+        let ends = |name| move |t: &mut EditedText| t.write("nodes", name, "may_end", Some("true"));
         replaces(ends("/a"), "/a: {} #", "/a: {may_end: true} #");
         replaces(ends("/c"), "..0}", "..0, may_end: true}");
-        let rate = |t: &mut EditedText| t.set("topics", "/null", "hz", "1..");
+        let rate = |t: &mut EditedText| t.write("topics", "/null", "hz", Some("1.."));
         replaces(rate, "/null:", "/null: {hz: 1..}");
-        let text = edited(|t| t.set("topics", "/block", "latched", "true"));
+        let text = edited(|t| t.write("topics", "/block", "latched", Some("true")));
         let added = differing(&text);
         assert_eq!(added, (vec![], vec!["    latched: true"]));
     }
@@ -548,9 +530,13 @@ topics:
     fn entries_are_added_and_removed_with_their_lines() {
         replaces(|t| t.drop_entry("nodes", "/a"), "  /a: {} # first\n", "");
         replaces(|t| t.drop_entry("topics", "/null"), "  /null:\n", "");
-        replaces(|t| t.unset("topics", "/scan", "hz"), "hz: 9..11, ", "");
+        replaces(
+            |t| t.write("topics", "/scan", "hz", None),
+            "hz: 9..11, ",
+            "",
+        );
         let by = ", by: [/a, \"/b: x\"]";
-        replaces(|t| t.unset("topics", "/scan", "by"), by, "");
+        replaces(|t| t.write("topics", "/scan", "by", None), by, "");
         let insert = |name| move |t: &mut EditedText| t.insert("nodes", name, "{}");
         replaces(insert("/b"), "  /c:  ", "  /b: {}\n  /c:  ");
         replaces(insert("/d"), "# kept\n", "# kept\n  /d: {}\n");

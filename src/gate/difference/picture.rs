@@ -331,7 +331,7 @@ impl UnionLog<'_> {
             "rate" => (Kind::Rate, topic),
             "type" => (Kind::Type, topic),
             "qos" => (Kind::Qos, topic),
-            "event" | "time" | "begin" | "end" | "lifecycle" | "restarts" => {
+            "event" | "time" | "begin" | "end" | "lifecycle" | "restarts" | "messages" => {
                 (Kind::Lifecycle, node.or(topic))
             }
             _ => return,
@@ -353,6 +353,7 @@ impl UnionLog<'_> {
         let event = difference.name.strip_prefix(&*difference.element);
         let of = |value: &str| match (difference.kind, value.parse::<usize>()) {
             ("restarts", Ok(n)) => words::count(n, "restart").into(),
+            ("messages", Ok(n)) => words::count(n, "message").into(),
             ("event", _) if value.is_empty() => "no such event".into(),
             ("begin", _) => format!("begins at {value}").into(),
             ("event" | "time", _) => format!("{} {value}", event.unwrap_or("").trim()).into(),

@@ -201,52 +201,24 @@ const MOST_BOXES: usize = 36 << 10;
 /// The largest number of characters of a name; a longer one is cut.
 const LONGEST: usize = 80;
 
-/// A box of the chart.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum ChartBox<'a> {
-    Node(&'a str),
-    Topic(&'a str),
-}
+/// A box of the chart: whether it is a topic, and its name.
+type ChartBox<'a> = (bool, &'a str);
 
-/// An arrow from box to box.
-#[derive(Clone, Copy)]
-struct Arrow<'a> {
-    from: ChartBox<'a>,
-    to: ChartBox<'a>,
-    /// Whether it is expected and missing; such an arrow is dotted.
-    is_missing: bool,
-}
-
-/// What happened to a box: a class of the chart, and the text after its name.
-struct BoxChange {
-    class: &'static str,
-    label: String,
-}
+/// An arrow from box to box in Mermaid's notation; one that is expected and missing is dotted.
+type Arrow<'a> = (ChartBox<'a>, &'static str, ChartBox<'a>);
 
 /// The chart; `None` if no finding is about the graph. Ends with a newline.
 fn chart(facts: &Facts<'_>, findings: &[&Finding]) -> Option<String> {
-    let mut marked: BTreeMap<ChartBox<'_>, BoxChange> = BTreeMap::new();
-    for finding in findings {
-        let class = finding.kind.row().class;
-        if class.is_empty() {
-            continue;
-        }
-        // The expected and the observed value.
-        let label = match finding.kind {
-            FindingKind::TopicRateLow | FindingKind::TopicRateHigh | FindingKind::NodeLifecycle => {
-                format!("{} → {}", finding.expected, finding.seen)
-            }
-            _ => String::new(),
-        };
-        let own = if finding.kind.is_about_node() {
-            ChartBox::Node(&finding.name)
-        } else {
-            ChartBox::Topic(&finding.name)
-        };
-        marked.entry(own).or_insert(BoxChange { class, label });
+    let mut marked: BTreeMap<ChartBox<'_>, &Finding> = BTreeMap::new();
+    for finding in findings.iter().filter(|f| !f.kind.row().class.is_empty()) {
+        let own = (!finding.kind.is_about_node(), finding.name.as_str());
+        marked.entry(own).or_insert(finding);
     }
     let arrows = arrows(facts, &marked, findings);
-    let mut boxes: BTreeSet<ChartBox<'_>> = arrows.iter().flat_map(|a| [a.from, a.to]).collect();
+    let mut boxes: BTreeSet<ChartBox<'_>> = arrows
+        .iter()
+        .flat_map(|(from, _, to)| [*from, *to])
+        .collect();
     boxes.extend(marked.keys().take(MOST_ITEMS));
     (!boxes.is_empty()).then(|| written(&boxes, &marked, &arrows))
 }
@@ -254,59 +226,40 @@ fn chart(facts: &Facts<'_>, findings: &[&Finding]) -> Option<String> {
 /// The arrows that are missing, then those of marked boxes.
 fn arrows<'a>(
     facts: &Facts<'a>,
-    marked: &BTreeMap<ChartBox<'_>, BoxChange>,
+    marked: &BTreeMap<ChartBox<'_>, &Finding>,
     findings: &[&'a Finding],
 ) -> Vec<Arrow<'a>> {
     let missing = findings.iter().filter_map(|finding| {
-        let node = ChartBox::Node(&finding.expected);
-        let topic = ChartBox::Topic(&finding.name);
-        let (from, to) = match finding.kind {
-            FindingKind::PublisherMissing => (node, topic),
-            FindingKind::SubscriberMissing => (topic, node),
-            _ => return None,
-        };
-        Some(Arrow {
-            from,
-            to,
-            is_missing: true,
-        })
+        let (node, topic) = ((false, &*finding.expected), (true, &*finding.name));
+        match finding.kind {
+            FindingKind::PublisherMissing => Some((node, "-.->", topic)),
+            FindingKind::SubscriberMissing => Some((topic, "-.->", node)),
+            _ => None,
+        }
     });
     let elements = &facts.mission.elements;
-    let arrow = |edge: &Edge, is_sent: bool| {
-        let node = ChartBox::Node(facts.role(edge.node));
-        let topic = ChartBox::Topic(facts.topic(edge.topic));
+    let ends = |edge: &Edge| {
+        let node = (false, facts.role(edge.node));
+        let topic = (true, facts.topic(edge.topic));
         let is_marked = marked.contains_key(&node) || marked.contains_key(&topic);
         let is_named = !edge.seen.evidence.is_guess();
         let is_robots = !facts.is_tool(&[edge.node]) && !facts.is_housekeeping(edge.topic);
-        let (from, to) = if is_sent {
-            (node, topic)
-        } else {
-            (topic, node)
-        };
-        (is_marked && is_named && is_robots).then_some(Arrow {
-            from,
-            to,
-            is_missing: false,
-        })
+        (is_marked && is_named && is_robots).then_some((node, topic))
     };
-    let sent = elements
-        .publishes
-        .iter()
-        .filter_map(|edge| arrow(edge, true));
-    let received = elements
-        .subscribes
-        .iter()
-        .filter_map(|edge| arrow(edge, false));
+    let sent = elements.publishes.iter().filter_map(ends);
+    let sent = sent.map(|(node, topic)| (node, "-->", topic));
+    let received = elements.subscribes.iter().filter_map(ends);
+    let received = received.map(|(node, topic)| (topic, "-->", node));
     let mut seen = BTreeSet::new();
     let all = missing.chain(sent).chain(received);
-    all.filter(|arrow| seen.insert((arrow.from, arrow.to)))
+    all.filter(|(from, _, to)| seen.insert((*from, *to)))
         .take(MOST_EDGES)
         .collect()
 }
 
 fn written(
     boxes: &BTreeSet<ChartBox<'_>>,
-    marked: &BTreeMap<ChartBox<'_>, BoxChange>,
+    marked: &BTreeMap<ChartBox<'_>, &Finding>,
     arrows: &[Arrow<'_>],
 ) -> String {
     let mut place: BTreeMap<&ChartBox<'_>, usize> = BTreeMap::new();
@@ -317,15 +270,19 @@ fn written(
         boxes.iter().partition(is_marked);
     order.extend(rest);
     for (at, own) in order.into_iter().enumerate() {
-        let (open, name, close) = match own {
-            ChartBox::Node(name) => ("([", name, "])"),
-            ChartBox::Topic(name) => ("[", name, "]"),
-        };
+        let (open, close) = if own.0 { ("[", "]") } else { ("([", "])") };
         let mark = marked.get(own);
-        let name = words::shorten(name, LONGEST);
-        let more = mark.map_or("", |mark| &mark.label);
+        let name = words::shorten(own.1, LONGEST);
+        // The expected and the observed value.
+        let more = match mark.map(|mark| (mark.kind, mark)) {
+            Some((
+                FindingKind::TopicRateLow | FindingKind::TopicRateHigh | FindingKind::NodeLifecycle,
+                mark,
+            )) => format!("{} → {}", mark.expected, mark.seen),
+            _ => String::new(),
+        };
         let text = escaped(format!("{name} {more}").trim_end());
-        let class = mark.map_or_else(String::new, |mark| format!(":::{}", mark.class));
+        let class = mark.map_or_else(String::new, |mark| format!(":::{}", mark.kind.row().class));
         let line = format!("  i{at}{open}\"{text}\"{close}{class}\n");
         if out.len() + line.len() > MOST_BOXES {
             break;
@@ -333,9 +290,8 @@ fn written(
         out.push_str(&line);
         place.insert(own, at);
     }
-    for arrow in arrows {
-        let line = if arrow.is_missing { "-.->" } else { "-->" };
-        if let (Some(from), Some(to)) = (place.get(&arrow.from), place.get(&arrow.to)) {
+    for (from, line, to) in arrows {
+        if let (Some(from), Some(to)) = (place.get(from), place.get(to)) {
             // Writing into a string does not fail.
             let _ = writeln!(out, "  i{from} {line} i{to}");
         }

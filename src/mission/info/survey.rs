@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use super::{BagInfo, Info, NodeInfo, TopicInfo, info};
+use super::{Info, NodeInfo, TopicInfo, info};
+use crate::bag::Report;
 use crate::base::columns::{Cell, Column, WHOLE, hang, table};
 use crate::base::name::{is_player, is_recorder};
 use crate::base::table::{Batch, ColumnKind, ColumnOf, TableCell, columns};
@@ -44,7 +45,7 @@ const COLUMNS: &[ColumnOf<(), SurveyRow>] = columns! {
     "path" Text |(), row| TableCell::text(&row.path);
     "bag_format" Text |(), row| of_bag(row, |bag| TableCell::text(&bag.format));
     "compression" Text |(), row| of_bag(row, |bag| TableCell::text(bag.compression.join(" ")));
-    "tier" Text |(), row| of_bag(row, |bag| TableCell::text(bag.tier));
+    "tier" Text |(), row| of_bag(row, |bag| TableCell::text(bag.tier.word()));
     "is_complete" FLAG |(), row| TableCell::Flag(row.is_complete);
     "file_bytes" I64 |(), row| TableCell::known(row.file_bytes, TableCell::count);
     "start_ns" Time |(), row| known(row, |info| TableCell::Time(Stamp(info.start_ns)));
@@ -74,7 +75,7 @@ fn known<'a>(row: &'a SurveyRow, cell: fn(&'a Info) -> TableCell<'a>) -> TableCe
     TableCell::known(row.info.as_ref(), cell)
 }
 
-fn of_bag<'a>(row: &'a SurveyRow, cell: fn(&'a BagInfo) -> TableCell<'a>) -> TableCell<'a> {
+fn of_bag<'a>(row: &'a SurveyRow, cell: fn(&'a Report) -> TableCell<'a>) -> TableCell<'a> {
     let info = row.info.as_ref();
     TableCell::known(info.and_then(|info| info.bags.first()), cell)
 }

@@ -59,7 +59,7 @@ fn head(out: &mut String, info: &Info) -> std::fmt::Result {
             visible(&bag.name),
             bag.format,
             words::bytes(bag.file_bytes),
-            bag.tier
+            bag.tier.word()
         )?;
         for (key, value) in &bag.facts {
             writeln!(out, "  {}: {}", visible(key), visible(value))?;

@@ -1,129 +1,42 @@
 //! A row per message, sorted by time over all bags, from the index, without payloads.
 
-use super::{Extract, Extracted, of_report, stop};
-use crate::bag::{Connection, ConnectionId, Sink as Takes, Want};
+use super::{Extract, Extracted, stop};
+use crate::bag::Want;
 use crate::base::error::{Error, Result};
-use crate::base::name::{NodeName, TopicName};
-use crate::base::notice::{Notice, Notices};
 use crate::base::table::{Batch, ColumnKind, TableCell, TableColumn};
-use crate::base::time::Stamp;
-use crate::evidence::times::{SeriesId, Stamps, Timed};
+use crate::evidence::times::Timed;
 use crate::export::sink::OutputSink;
 use crate::export::tables::writer::begin;
 use crate::pipeline::Watch;
-use crate::view::NameFilter;
-use std::collections::BTreeSet;
-use std::path::Path;
-use std::sync::Arc;
+use crate::pipeline::times::{MessageTimes, Sender};
 
 /// The number of rows buffered before they are written.
 const MOST_ROWS: usize = 16 * 1024;
 
-/// Reads all times first, spilling to an unnamed file if necessary, then writes them sorted, so that bags that overlap
-/// in time make one sorted table.
+/// Reads all times first, then writes them sorted, so that bags that overlap in time make one sorted table.
 pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
     let sink = OutputSink::create(&job.target, None)?;
     let range = job.range(watch)?;
-    let mut taken = Taken::default();
+    let mut times = MessageTimes::new(&job.topics, Want::Sizes);
     for mut reader in job.open()? {
-        let mut one = OfBag {
-            taken: &mut taken,
-            filter: &job.topics,
-            sources: Vec::new(),
-            watch: &mut *watch,
-        };
-        let report = reader.read(range, &mut one)?;
-        taken.notices.extend(of_report(&report, &taken.notices));
+        times.read(&mut *reader, range, watch)?;
         stop(watch)?;
     }
-    let rows = write(job, &mut taken, sink, watch)?;
+    times.finish()?;
     Ok(Extracted {
         tables: 1,
-        rows,
+        rows: write(job, &times, sink, watch)?,
         undecoded: 0,
-        notices: taken.notices,
-        topics: taken.topics,
+        notices: times.notices,
+        topics: times.topics,
     })
 }
 
-/// The source of messages: the cells that are the same in all rows of one connection.
-struct RowSource {
-    topic: TopicName,
-    type_name: Arc<str>,
-    publisher: Option<Arc<str>>,
-    /// Whether the sizes of its messages are known.
-    is_sized: bool,
-}
-
-/// The times of all extracted messages.
-#[derive(Default)]
-struct Taken {
-    stamps: Stamps,
-    /// The source of each series, by the number of the series.
-    sources: Vec<RowSource>,
-    series: Vec<SeriesId>,
-    notices: Notices,
-    /// All topics of the bags.
-    topics: BTreeSet<TopicName>,
-}
-
-impl Taken {
-    fn add(&mut self, connection: &Connection, is_sized: bool) -> SeriesId {
-        self.sources.push(RowSource {
-            topic: connection.topic.clone(),
-            type_name: Arc::clone(&connection.type_name),
-            publisher: connection.publisher.as_ref().map(NodeName::shared),
-            is_sized,
-        });
-        let id = self.stamps.series();
-        self.series.push(id);
-        id
-    }
-}
-
-/// The series of a connection: messages of known size, and the others.
-type Series = Option<[SeriesId; 2]>;
-
-/// The sink for one bag.
-struct OfBag<'a> {
-    taken: &'a mut Taken,
-    filter: &'a NameFilter,
-    sources: Vec<Series>,
-    watch: &'a mut dyn Watch,
-}
-
-impl Takes for OfBag<'_> {
-    fn connection(&mut self, connection: &Connection) -> Want {
-        let is_wanted = self.filter.passes(connection.topic.as_str());
-        self.taken.topics.insert(connection.topic.clone());
-        let mut series = |is_sized| self.taken.add(connection, is_sized);
-        self.sources
-            .push(is_wanted.then(|| [series(true), series(false)]));
-        if is_wanted { Want::Sizes } else { Want::Stamps }
-    }
-
-    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
-        let series = self.sources.get(connection.0 as usize);
-        if let Some(Some([sized, sizeless])) = series {
-            let series = if sizes.is_some() { *sized } else { *sizeless };
-            self.taken.stamps.add(series, stamps, sizes);
-        }
-    }
-
-    fn notice(&mut self, notice: Notice) {
-        self.taken.notices.add(notice);
-    }
-
-    fn progress(&mut self, done: u64, total: u64) {
-        self.watch.progress(done, total);
-    }
-}
-
-/// The table without rows. A text is stored once per source, and referenced in rows by the source's number.
-fn table(sources: &[RowSource]) -> Batch {
-    let topics = sources.iter().map(|s| s.topic.as_str());
-    let types = sources.iter().map(|s| &*s.type_name);
-    let publishers = sources.iter().map(|s| s.publisher.as_deref().unwrap_or(""));
+/// The table without rows. A text is stored once per sender, and referenced in rows by the sender's number.
+fn table(senders: &[Sender]) -> Batch {
+    let topics = senders.iter().map(|s| s.topic.as_str());
+    let types = senders.iter().map(|s| &*s.type_name);
+    let publishers = senders.iter().map(|s| s.node.as_deref().unwrap_or(""));
     Batch::of([
         TableColumn::full("time_ns", ColumnKind::Time, 0),
         TableColumn::words("topic", topics),
@@ -134,19 +47,29 @@ fn table(sources: &[RowSource]) -> Batch {
 }
 
 /// Writes all rows sorted by time, then by connection.
-fn write(job: &Extract, taken: &mut Taken, sink: OutputSink, watch: &mut dyn Watch) -> Result<u64> {
-    let spool = |e| Error::io("read", Path::new("temporary file of times"))(e);
-    taken.stamps.finish().map_err(spool)?;
+fn write(
+    job: &Extract,
+    times: &MessageTimes<'_>,
+    sink: OutputSink,
+    watch: &mut dyn Watch,
+) -> Result<u64> {
     let failed = || Error::io("write", job.target.path());
-    let sources = &taken.sources;
-    let mut batch = table(sources);
+    let mut batch = table(&times.senders);
     let mut writer = begin(job.format, sink, &batch, &[]).map_err(failed())?;
     let (mut rows, mut result) = (0, Ok(()));
     let each = |timed: Timed| {
         if result.is_err() {
             return;
         }
-        batch.push(&row(&sources[timed.series], &timed));
+        let number = TableCell::Word(u32::try_from(timed.series).unwrap_or(u32::MAX));
+        let is_sized = times.stamps.sized(times.series[timed.series]);
+        batch.push(&[
+            TableCell::Time(timed.time),
+            number.clone(),
+            number.clone(),
+            TableCell::known(times.senders[timed.series].node.as_ref(), |_| number),
+            TableCell::known(is_sized.then_some(timed.size), TableCell::count),
+        ]);
         rows += 1;
         if batch.rows == MOST_ROWS {
             let written = writer.write(&batch).map_err(failed());
@@ -154,20 +77,9 @@ fn write(job: &Extract, taken: &mut Taken, sink: OutputSink, watch: &mut dyn Wat
             batch.clear();
         }
     };
-    taken.stamps.merge(&taken.series, each).map_err(spool)?;
+    times.merge(&times.series, each)?;
     result?;
     writer.write(&batch).map_err(failed())?;
     writer.finish().map_err(failed())?.commit()?;
     Ok(rows)
-}
-
-fn row(source: &RowSource, timed: &Timed) -> [TableCell<'static>; 5] {
-    let number = u32::try_from(timed.series).unwrap_or(u32::MAX);
-    [
-        TableCell::Time(timed.time),
-        TableCell::Word(number),
-        TableCell::Word(number),
-        TableCell::known(source.publisher.as_ref(), |_| TableCell::Word(number)),
-        TableCell::known(source.is_sized.then_some(timed.size), TableCell::count),
-    ]
 }

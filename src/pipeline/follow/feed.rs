@@ -2,16 +2,20 @@
 //! contradict it.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 
 use super::SoFar;
+use crate::base::error::Result;
 use crate::base::rhythm::{CLOSING_NS, SWITCH_NS, TOGETHER_NS};
 use crate::base::time::Stamp;
 use crate::base::words::worded;
-use crate::gate::{Severity, Verdict};
+use crate::gate::{Expectation, Severity, judge};
+use crate::graph::window::Length;
 use crate::mission::Mission;
 use crate::mission::event_log::{Detail, Event, InterruptionKind, Kind};
 use crate::mission::event_log::{LogFormat, LogLine, LogRow, headlines, quoted, row_lines};
+use crate::pipeline::expectation;
 
 worded! {
     /// The certainty of a line.
@@ -195,23 +199,37 @@ fn certainty(event: &Event, now: Stamp) -> Certainty {
 }
 
 /// The findings of an expectation so far, by fingerprint: since when, and the line once it was printed.
-#[derive(Default)]
-pub(crate) struct FindingFeed {
+pub struct FindingFeed {
+    expectation: Expectation,
     seen: BTreeMap<String, (Stamp, Option<LogLine>)>,
 }
 
 impl FindingFeed {
+    /// No findings yet, of the expectation in this file.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub fn new(path: &Path) -> Result<Self> {
+        Ok(Self {
+            expectation: expectation(path)?.1,
+            seen: BTreeMap::new(),
+        })
+    }
+
+    /// The length of windows according to the file.
+    pub fn length(&self) -> Length {
+        self.expectation.period.map_or(Length::Auto, Length::Fixed)
+    }
+
     /// The lines about findings that have become certain, and about those that no longer apply.
-    pub(crate) fn new_lines(
-        &mut self,
-        verdict: &Verdict,
-        now: Stamp,
-        format: LogFormat,
-    ) -> Vec<LogLine> {
+    pub fn new_lines(&mut self, known: &SoFar, format: LogFormat) -> Vec<LogLine> {
+        let now = known.now;
+        let verdict = judge(&self.expectation, &known.mission, known.is_part());
         let mut lines = Vec::new();
         let mut there = BTreeMap::new();
         for finding in verdict.findings() {
-            if !matches!(finding.severity, Severity::Error | Severity::Warning) {
+            let is_broken = matches!(finding.severity, Severity::Error | Severity::Warning);
+            if !is_broken || finding.is_open {
                 continue;
             }
             let (severity, kind) = (finding.severity.word(), finding.kind.word());

@@ -1,21 +1,20 @@
 //! Counts the messages of a recording per publisher, topic and window, by its index alone.
 
 use std::collections::BTreeMap;
-use std::io;
-use std::path::Path;
 use std::sync::Arc;
 
-use crate::bag::{self, Connection, ConnectionId, Input, OpenOptions, Sink, Want};
-use crate::base::error::{Error, Result};
-use crate::base::name::NodeName;
-use crate::base::notice::{Notice, Notices};
+use crate::bag::{self, Input, OpenOptions, Want};
+use crate::base::error::Result;
+use crate::base::notice::Notices;
 use crate::base::role::role;
 use crate::base::table::{Batch, ColumnKind, ColumnOf, TableCell, columns};
 use crate::base::time::{Period, Stamp};
-use crate::evidence::times::{SeriesId, Stamps};
+use crate::evidence::times::SeriesId;
 use crate::graph::window::Align;
-use crate::pipeline::extract::of_report;
+use crate::pipeline::Unwatched;
 use crate::pipeline::inputs::each_once;
+use crate::pipeline::times::{MessageTimes, Sender};
+use crate::view::NameFilter;
 
 /// The windows in which messages are counted.
 #[derive(Clone, Copy, Debug)]
@@ -58,19 +57,16 @@ pub struct Counted {
 /// If it cannot be read, or if the temporary file of times cannot be used.
 pub fn count(name: &str, inputs: &[Input], counting: &Counting) -> Result<Counted> {
     let (inputs, twice) = each_once(inputs)?;
-    let mut taken = Taken::default();
-    taken.notices.extend(twice);
+    let every = NameFilter::default();
+    let mut times = MessageTimes::new(&every, Want::Stamps);
+    times.notices.extend(twice);
     let mut format = String::new();
     for input in inputs {
-        taken.series.clear();
-        let report = bag::open(&input, &OpenOptions::default())?.read(None, &mut taken)?;
-        let lost = of_report(&report, &taken.notices);
-        taken.notices.extend(lost);
-        format = report.format;
+        let mut reader = bag::open(&input, &OpenOptions::default())?;
+        format = times.read(&mut *reader, None, &mut Unwatched)?.format;
     }
-    let spool = |error| Error::io("read", Path::new("temporary file of times"))(error);
-    taken.stamps.finish().map_err(spool)?;
-    let (first, _, messages) = taken.stamps.extent().unwrap_or_default();
+    times.finish()?;
+    let (first, _, messages) = times.stamps.extent().unwrap_or_default();
     let windows = Windows {
         origin: match counting.align {
             Align::Clock => Stamp(0),
@@ -78,7 +74,7 @@ pub fn count(name: &str, inputs: &[Input], counting: &Counting) -> Result<Counte
         },
         period: counting.period,
     };
-    let mut counts = taken.counts(windows).map_err(spool)?;
+    let mut counts = counts(&times, windows)?;
     counts.sort_by(|a, b| (a.window, &a.sender).cmp(&(b.window, &b.sender)));
     let table = CountTable {
         bag: name.to_owned(),
@@ -88,7 +84,7 @@ pub fn count(name: &str, inputs: &[Input], counting: &Counting) -> Result<Counte
     Ok(Counted {
         rows: Batch::filled(COLUMNS, &table, &counts),
         messages,
-        notices: taken.notices,
+        notices: times.notices,
     })
 }
 
@@ -117,14 +113,6 @@ impl Windows {
 fn saturated(number: i128) -> i64 {
     let limit = if number < 0 { i64::MIN } else { i64::MAX };
     i64::try_from(number).unwrap_or(limit)
-}
-
-/// A publisher of a topic with a type, or the unnamed ones.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Sender {
-    topic: Arc<str>,
-    type_name: Arc<str>,
-    node: Option<Arc<str>>,
 }
 
 /// The messages of one sender in one window.
@@ -162,7 +150,7 @@ const COLUMNS: &[ColumnOf<CountTable, Count>] = columns! {
     "win" I64 |_, count| TableCell::Int(count.window);
     "start_ns" I64 |table, count| TableCell::Int(table.windows.start(count.window).0);
     "end_ns" I64 |table, count| TableCell::Int(table.windows.start(count.window.saturating_add(1)).0);
-    "topic" Text |_, count| TableCell::text(&*count.sender.topic);
+    "topic" Text |_, count| TableCell::text(count.sender.topic.as_str());
     "type" Text |_, count| TableCell::text(&*count.sender.type_name);
     "node" Text |_, count| TableCell::known(count.sender.node.as_deref(), TableCell::text);
     "node_role" Text |_, count| TableCell::known(count.sender.node.as_deref().map(role), TableCell::text);
@@ -173,77 +161,41 @@ const COLUMNS: &[ColumnOf<CountTable, Count>] = columns! {
     "max_gap_ns" I64 |_, count| TableCell::known(count.max_gap_ns, TableCell::Int);
 };
 
-/// The series of a connection: messages of known size, and the others.
-type Series = [SeriesId; 2];
-
-/// The times of a recording.
-#[derive(Default)]
-struct Taken {
-    stamps: Stamps,
-    senders: BTreeMap<Sender, Vec<SeriesId>>,
-    /// The series of each connection of the current part.
-    series: Vec<Series>,
-    notices: Notices,
-}
-
-impl Taken {
-    /// The counts of all senders.
-    fn counts(&self, windows: Windows) -> io::Result<Vec<Count>> {
-        let mut all: Vec<Count> = Vec::new();
-        for (sender, series) in &self.senders {
-            let sender = Arc::new(sender.clone());
-            let is_sized: Vec<bool> = series.iter().map(|id| self.stamps.sized(*id)).collect();
-            let mut end = None;
-            self.stamps.merge(series, |timed| {
-                let size = is_sized[timed.series].then_some(u64::from(timed.size));
-                // Messages are sorted by time, so most are in the window of the one before.
-                if let Some(count) = all
-                    .last_mut()
-                    .filter(|_| end.is_some_and(|end| timed.time < end))
-                {
-                    count.add(timed.time, size);
-                    return;
-                }
-                let window = windows.index(timed.time);
-                end = Some(windows.start(window.saturating_add(1)));
-                all.push(Count {
-                    sender: Arc::clone(&sender),
-                    window,
-                    n: 1,
-                    bytes: size,
-                    first: timed.time,
-                    last: timed.time,
-                    max_gap_ns: None,
-                });
-            })?;
-        }
-        Ok(all)
+/// The counts of all senders.
+fn counts(times: &MessageTimes<'_>, windows: Windows) -> Result<Vec<Count>> {
+    let mut senders: BTreeMap<&Sender, Vec<SeriesId>> = BTreeMap::new();
+    for (sender, series) in times.senders.iter().zip(&times.series) {
+        senders.entry(sender).or_default().push(*series);
     }
-}
-
-impl Sink for Taken {
-    fn connection(&mut self, connection: &Connection) -> Want {
-        let sender = Sender {
-            topic: Arc::from(connection.topic.as_str()),
-            type_name: Arc::clone(&connection.type_name),
-            node: connection.publisher.as_ref().map(NodeName::shared),
-        };
-        let series = [self.stamps.series(), self.stamps.series()];
-        self.senders.entry(sender).or_default().extend(series);
-        self.series.push(series);
-        Want::Stamps
+    let mut all: Vec<Count> = Vec::new();
+    for (sender, series) in senders {
+        let sender = Arc::new(sender.clone());
+        let mut end = None;
+        times.merge(&series, |timed| {
+            let is_sized = times.stamps.sized(series[timed.series]);
+            let size = is_sized.then_some(u64::from(timed.size));
+            // Messages are sorted by time, so most are in the window of the one before.
+            if let Some(count) = all
+                .last_mut()
+                .filter(|_| end.is_some_and(|end| timed.time < end))
+            {
+                count.add(timed.time, size);
+                return;
+            }
+            let window = windows.index(timed.time);
+            end = Some(windows.start(window.saturating_add(1)));
+            all.push(Count {
+                sender: Arc::clone(&sender),
+                window,
+                n: 1,
+                bytes: size,
+                first: timed.time,
+                last: timed.time,
+                max_gap_ns: None,
+            });
+        })?;
     }
-
-    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
-        if let Some([sized, sizeless]) = self.series.get(connection.0 as usize) {
-            let series = if sizes.is_some() { *sized } else { *sizeless };
-            self.stamps.add(series, stamps, sizes);
-        }
-    }
-
-    fn notice(&mut self, notice: Notice) {
-        self.notices.add(notice);
-    }
+    Ok(all)
 }
 
 #[cfg(test)]

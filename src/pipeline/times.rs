@@ -1,0 +1,126 @@
+//! The times of all messages per connection, from the index, without payloads; they spill to an unnamed file if necessary.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::Watch;
+use super::extract::of_report;
+use crate::bag::{Connection, ConnectionId, Reader, Report, Sink, Want};
+use crate::base::error::{Error, Result};
+use crate::base::name::{NodeName, TopicName};
+use crate::base::notice::{Notice, Notices};
+use crate::base::time::{Span, Stamp};
+use crate::evidence::times::{SeriesId, Stamps, Timed};
+use crate::view::NameFilter;
+
+/// A publisher of a topic with a type, or the unnamed ones.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Sender {
+    pub(super) topic: TopicName,
+    pub(super) type_name: Arc<str>,
+    pub(super) node: Option<Arc<str>>,
+}
+
+/// The times of the messages of some topics, over several bags.
+pub(super) struct MessageTimes<'a> {
+    filter: &'a NameFilter,
+    /// What is wanted of these topics: their times alone, or sizes too.
+    want: Want,
+    pub(super) stamps: Stamps,
+    /// Two per connection: messages of known size, and the others.
+    pub(super) series: Vec<SeriesId>,
+    /// The sender of each series.
+    pub(super) senders: Vec<Sender>,
+    pub(super) notices: Notices,
+    /// All topics of the bags.
+    pub(super) topics: BTreeSet<TopicName>,
+}
+
+impl<'a> MessageTimes<'a> {
+    pub(super) fn new(filter: &'a NameFilter, want: Want) -> Self {
+        Self {
+            filter,
+            want,
+            stamps: Stamps::default(),
+            series: Vec::new(),
+            senders: Vec::new(),
+            notices: Notices::default(),
+            topics: BTreeSet::new(),
+        }
+    }
+
+    /// Adds a bag, or the part of it in `range`.
+    pub(super) fn read(
+        &mut self,
+        reader: &mut dyn Reader,
+        range: Option<Span>,
+        watch: &mut dyn Watch,
+    ) -> Result<Report> {
+        let mut one = OfBag {
+            series: Vec::new(),
+            all: self,
+            watch,
+        };
+        let report = reader.read(range, &mut one)?;
+        self.notices.extend(of_report(&report, &self.notices));
+        Ok(report)
+    }
+
+    /// After the last bag.
+    pub(super) fn finish(&mut self) -> Result<()> {
+        self.stamps.finish().map_err(spool)
+    }
+
+    /// Passes on the messages of these series sorted by time, then by series.
+    pub(super) fn merge(&self, series: &[SeriesId], each: impl FnMut(Timed)) -> Result<()> {
+        self.stamps.merge(series, each).map_err(spool)
+    }
+}
+
+fn spool(error: std::io::Error) -> Error {
+    Error::io("read", Path::new("temporary file of times"))(error)
+}
+
+/// The sink for one bag.
+struct OfBag<'a, 'b> {
+    all: &'a mut MessageTimes<'b>,
+    /// The series of each of its connections: messages of known size, and the others.
+    series: Vec<Option<[SeriesId; 2]>>,
+    watch: &'a mut dyn Watch,
+}
+
+impl Sink for OfBag<'_, '_> {
+    fn connection(&mut self, connection: &Connection) -> Want {
+        let all = &mut *self.all;
+        let is_wanted = all.filter.passes(connection.topic.as_str());
+        all.topics.insert(connection.topic.clone());
+        self.series.push(is_wanted.then(|| {
+            let series = [all.stamps.series(), all.stamps.series()];
+            all.series.extend(series);
+            all.senders.extend(series.map(|_| Sender {
+                topic: connection.topic.clone(),
+                type_name: Arc::clone(&connection.type_name),
+                node: connection.publisher.as_ref().map(NodeName::shared),
+            }));
+            series
+        }));
+        if is_wanted { all.want } else { Want::Stamps }
+    }
+
+    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
+        let series = self.series.get(connection.0 as usize);
+        if let Some(Some([sized, sizeless])) = series {
+            let series = if sizes.is_some() { *sized } else { *sizeless };
+            self.all.stamps.add(series, stamps, sizes);
+        }
+    }
+
+    fn notice(&mut self, notice: Notice) {
+        self.all.notices.add(notice);
+    }
+
+    fn progress(&mut self, done: u64, total: u64) {
+        self.watch.progress(done, total);
+    }
+}
