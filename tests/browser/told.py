@@ -44,6 +44,7 @@ def check(url, timeline, quiet, evolution, headlines):
             b.open(url)
             time.sleep(0.3)
             changes(b, wide)
+            saved(b)
     print("  the page tells every change with its time, and next change shows it, on three screens")
 
 
@@ -85,6 +86,14 @@ def sentence(b, quiet):
         assert "None" not in b.js("return document.body.innerText")
     shown = b.js("return [...document.querySelectorAll('#fresh, #allchanges, [data-key=\"]\"], [data-key=c], #marks')].filter(e => e.getClientRects().length).map(e => e.id || e.dataset.key)")
     assert not shown, f"{shown} cannot be used without changes"
+
+
+def saved(b):
+    """A saved picture has the name and the sentence, and the policy of the page refuses none of it."""
+    b.log("browser")
+    b.js("HTMLAnchorElement.prototype.click = function () { window.got = decodeURIComponent(this.href); }; const s = document.getElementById('save'); s.value = 'svg'; s.dispatchEvent(new Event('change'))")
+    picture, name, sentence = b.js("return [window.got, document.querySelector('h1').textContent, document.getElementById('sentence').textContent]")
+    assert name in picture and sentence[:60] in picture and not b.log("browser"), picture[:200]
 
 
 def changes(b, wide):

@@ -41,11 +41,10 @@ const HEAD = 44;
 function picture() {
 	const copy = svg().cloneNode(true), [x, top, width, part] = visible(), unit = width / wide, y = top - HEAD * unit, height = part + HEAD * unit;
 	set(copy, { xmlns: 'http://www.w3.org/2000/svg', width: wide, height: high + HEAD, viewBox: [x, y, width, height].join(' ') });
-	const fill = getComputedStyle(document.body).color, most = wide / 6.5;
-	copy.append(...[`${missionName} · ${$.where.textContent}`, $.sentence.textContent].map((text, k) =>
-		drawn('text', { x: x + 8 * unit, y: y + (18 + 18 * k) * unit, style: `fill:${fill};font-size:${12 * unit}px` }, text.length > most ? text.slice(0, most) + '…' : text)));
-	const style = drawn('style', {}, [...document.querySelectorAll('style')].map(sheet => sheet.textContent).join(''));
-	copy.prepend(style, $.signs.querySelector('defs').cloneNode(true), drawn('rect', { x, y, width, height, style: `fill:${getComputedStyle(document.body).backgroundColor};stroke:none` }));
+	const { color, backgroundColor: fill } = getComputedStyle(document.body), most = wide / 6.5;
+	copy.prepend(drawn('style', {}, [...document.querySelectorAll('style')].map(sheet => sheet.textContent).join('')), $.signs.querySelector('defs').cloneNode(true), drawn('rect', { x, y, width, height, fill }));
+	copy.append(drawn('rect', { x, y, width, height: HEAD * unit, fill }), ...[`${missionName} · ${$.where.textContent}`, $.sentence.textContent].map((text, k) =>
+		drawn('text', { x: x + 8 * unit, y: y + (18 + 18 * k) * unit, fill: color, 'font-family': 'Inter', 'font-size': 12 * unit }, text.length > most ? text.slice(0, most) + '…' : text)));
 	copy.querySelectorAll('.off').forEach(e => e.remove());
 	return new XMLSerializer().serializeToString(copy);
 }
