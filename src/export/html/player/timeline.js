@@ -40,7 +40,7 @@ function drawTime() {
 	// Rows without events are folded if not all have space, since those with events tell the mission.
 	const most = small ? 5 : isTopicTimeline ? 56 : 14, least = small ? 2 : isTopicTimeline ? 20 : 9;
 	const room = beforePrint ? Infinity : small ? 48 : isTopicTimeline ? $.controls.clientHeight - $.buttons.offsetHeight - 110 : innerHeight * .3;
-	const isTight = !isTopicTimeline && !quiet.every(Boolean) && rows.filter(([i]) => i < 0 || !isOut(whole, i)).length * (small ? 3 : least) > room;
+	const isTight = !isTopicTimeline && rows.some(([i], r) => i >= 0 && !quiet[r]) && rows.filter(([i]) => i < 0 || !isOut(whole, i)).length * (small ? 3 : least) > room;
 	let count = 0;
 	isFolded = isTight && (small || !showsAll);
 	placeOf = rows.map((row, r) => isRowOut(row, r) ? -1 : count++);
