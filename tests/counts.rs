@@ -231,20 +231,17 @@ fn place(number: &Value) -> usize {
     usize::try_from(number.as_u64().unwrap()).unwrap()
 }
 
-/// The report's first line: its numbers add up to all headlines.
+/// The report's first line: it counts all headlines.
 fn report(markdown: &str, (expected, all): (&[BTreeSet<u64>], &[BTreeSet<u64>]), at: &str) {
     let windows = all.iter().filter(|shown| !shown.is_empty()).count();
     let all: usize = expected.iter().map(BTreeSet::len).sum();
     let mut lines = markdown.lines().filter(|line| !line.is_empty());
     let (first, second) = (lines.next().unwrap(), lines.next().unwrap());
     let (_, shown) = first.split_once("**: ").unwrap();
-    let numbers = shown
-        .split(' ')
-        .filter_map(|word| word.parse::<usize>().ok());
     let (_, changed) = second.rsplit_once(", ").unwrap();
     let changed: usize = changed.split(' ').next().unwrap().parse().unwrap();
     assert_eq!(changed, windows, "{at}: {second}");
-    assert_eq!(numbers.sum::<usize>(), all, "{at}: {first}");
+    assert!(shown.contains(&format!(", {all} change")), "{at}: {first}");
 }
 
 /// A flow chart has marks if and only if there is a headline.

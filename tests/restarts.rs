@@ -22,7 +22,8 @@ fn restarts(bags: &[PathBuf], stdin: Stdio) -> Vec<String> {
         .output()
         .unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
-    let lines = text.lines().filter(|line| line.contains(" restarted"));
+    let lines = text.lines().skip(1);
+    let lines = lines.filter(|line| line.contains(" restarted"));
     lines.map(|line| line.trim().to_owned()).collect()
 }
 

@@ -13,6 +13,7 @@ use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::export::tables::TableFormat;
 use crate::graph::window::Length;
+use crate::mission::Mission;
 use crate::mission::event_log::{LogFormat, LogLine, LogOptions, body, lines, log, whole};
 use crate::mission::info::{SurveyRow, json, survey_text};
 use crate::pipeline::{Reading, Survey, each, explain, is_survey, read, survey, survey_file};
@@ -86,6 +87,12 @@ const PARTS: u32 = 32;
 /// The note about an empty log.
 pub(super) const NO_EVENTS: &str = "no events: nothing started, stopped or changed";
 
+/// The log for people: the mission as one sentence, and its events.
+fn introduced(mission: &Mission, options: LogOptions) -> impl Iterator<Item = LogLine> {
+    let first = LogLine::plain(&crate::mission::info::info(mission).summary);
+    std::iter::once(first).chain(lines(mission, options))
+}
+
 /// Prints the log of a mission, or those of the bags in a folder.
 pub(super) fn events(args: &EventsArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     let mut reading = reading(&args.inputs, &args.graph)?;
@@ -109,13 +116,14 @@ pub(super) fn events(args: &EventsArgs, given: &Given, terminal: &mut Terminal) 
         return events_of_folder(folder, &reading, each, terminal);
     }
     let mission = read(&reading, terminal)?;
-    let lines = lines(&mission, options);
-    match format {
-        LogFormat::Text => drop(terminal.log(&lines, format)?),
-        _ => terminal.results(&log(&mission, format, options))?,
-    }
-    if lines.is_empty() {
-        terminal.note(NO_EVENTS);
+    if format == LogFormat::Text {
+        let lines: Vec<LogLine> = introduced(&mission, options).collect();
+        terminal.log(&lines, format)?;
+    } else {
+        terminal.results(&log(&mission, format, options))?;
+        if lines(&mission, options).is_empty() {
+            terminal.note(NO_EVENTS);
+        }
     }
     // The log is the same for every period.
     terminal.notices(&mission.notices.without(NoticeKind::Chosen));
@@ -145,9 +153,7 @@ fn events_of_folder(
             Ok(mission) => {
                 if format == LogFormat::Text {
                     shown.push(LogLine::plain(name));
-                    let own = lines(&mission, options);
-                    let none = own.is_empty().then(|| LogLine::plain(NO_EVENTS));
-                    shown.extend(own.into_iter().chain(none));
+                    shown.extend(introduced(&mission, options));
                 } else {
                     rows += &body(&mission, Some(name), format, options);
                 }

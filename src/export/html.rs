@@ -6,7 +6,7 @@
 mod data;
 mod element_runs;
 mod signs;
-mod table;
+mod told;
 
 use std::fmt::Write as _;
 
@@ -15,19 +15,22 @@ use crate::base::digest;
 use crate::base::notice::NoticeKind;
 use crate::base::words;
 use crate::base::words::visible;
-use crate::draw::paint::classes::{self, Classes, ElementLook};
+use crate::draw::paint::classes::{self, Classes};
 use crate::draw::paint::svg;
 use crate::draw::paint::xml::Xml;
 use crate::draw::picture::title::SIDES;
 use crate::draw::picture::{Union, rate_label};
 use crate::draw::style::{BUILTIN, Style};
 use crate::draw::text;
+use crate::draw::timeline::Timeline;
 use crate::draw::topic_timeline::Overview;
 use crate::export::sequence::{Sequence, UnionDrawings};
 use crate::export::target::Target;
 use crate::graph::Id as _;
+use crate::mission::info::info;
 use crate::view::{ArrowId, ItemId, View};
-use element_runs::{ElementRuns, ViewRuns};
+use element_runs::ViewRuns;
+use told::Told;
 
 const PAGE: &str = include_str!("html/player/page.html");
 const LOOK: &str = include_str!("html/player/page.css");
@@ -134,10 +137,11 @@ impl HtmlPage<'_> {
     /// The page: UTF-8, without any requests; its policy allows its scripts and styles by digest.
     pub(crate) fn write(&self) -> String {
         let still = self.whole.view.busiest_change();
+        let told = Told::new(self);
         let fonts = fonts();
         let look = self.look();
         let script = SCRIPT.map(squeezed).join("\n");
-        let (data, data_type) = data::packed(&data::json(self, still));
+        let (data, data_type) = data::packed(&data::json(self, still, &told));
         let policy = format!(
             "default-src 'none';script-src {};style-src {} {};font-src data:;img-src data:;base-uri 'none';form-action 'none'",
             digest::policy(&script),
@@ -157,24 +161,29 @@ impl HtmlPage<'_> {
             None if view.compares => "compares",
             None => "",
         };
-        let mut title = Xml::default();
-        title.text(&visible(self.title));
-        let title = title.finish();
+        let escaped = |text: &str| {
+            let mut xml = Xml::default();
+            xml.text(text);
+            xml.finish()
+        };
+        let title = escaped(&visible(self.title));
+        let sentence = info(self.sequence.mission).summary;
+        let begin = words::date(told.clock.0.0).unwrap_or_default();
         fill(PAGE, |key| match key {
             "policy" => policy.clone(),
             "schemes" => schemes.to_owned(),
             "kind" => kind.to_owned(),
             "title" => title.clone(),
+            "sentence" => escaped(&sentence),
             "fonts" => fonts.clone(),
             "css" => look.clone(),
             "signs" => self.signs(),
             "graph" => self.graphs(still),
             "where" => self.place(still),
-            "when" => self.when(),
-            "summary" => table::summary(view),
+            "date" => begin.clone(),
             "last" => view.frames.len().saturating_sub(1).to_string(),
-            "rows" => table::rows(view),
-            "legend" => self.legend(),
+            "changes" => told.table(view.compares),
+            "legend" => self.legend(told.lives.as_ref()),
             "notes" => self.notes(),
             "data_type" => data_type.to_owned(),
             "data" => data.clone(),
@@ -213,14 +222,13 @@ impl HtmlPage<'_> {
         xml.finish()
     }
 
-    fn legend(&self) -> String {
+    fn legend(&self, lives: Option<&Timeline>) -> String {
         // The timeline of topics has no boxes and lines.
         let views: Vec<&View> = match self.overview {
             Some(_) => Vec::new(),
             None => self.drawn().map(|d| d.view).collect(),
         };
         let change = self.sequence.unfolded.map_or(0.25, |u| u.rate_change);
-        let lives = self.sequence.unfolded.and_then(|u| u.lives);
         signs::legend(&views, change) + &lives.map(signs::timeline).unwrap_or_default()
     }
 
@@ -258,7 +266,10 @@ impl HtmlPage<'_> {
         (id, is_hidden): (&str, bool),
         still: usize,
     ) {
-        let graph = Classes::new(drawn.view, &drawn.union);
+        let graph = Classes {
+            view: drawn.view,
+            union: &drawn.union,
+        };
         let runs = &drawn.runs;
         let window = u32::try_from(still).unwrap_or(0);
         // A margin, and space around a small graph: three boxes that fill the screen are hard to read.
@@ -288,12 +299,12 @@ impl HtmlPage<'_> {
         layer(xml, "arrows");
         for &id in &drawn.order {
             let life = &runs.arrows[id.at()];
-            graph.arrow(xml, id, &Still { runs, life, window });
+            graph.arrow(xml, id, runs.look(life, window));
         }
         xml.close();
         layer(xml, "items");
         for (item, life) in runs.items.iter().enumerate() {
-            graph.item(xml, ItemId::of(item), &Still { runs, life, window });
+            graph.item(xml, ItemId::of(item), runs.look(life, window));
         }
         xml.close().close();
     }
@@ -309,22 +320,6 @@ impl HtmlPage<'_> {
         let at = words::offset(at.span.start.since(first.span.start));
         format!("window {} of {} · {at}", still + 1, frames.len())
     }
-
-    /// The date at which the mission begins, its length, and its division into windows.
-    fn when(&self) -> String {
-        let frames = &self.whole.view.frames;
-        let (Some(first), Some(last)) = (frames.first(), frames.last()) else {
-            return String::new();
-        };
-        let whole = last.span.end.since(first.span.start) / 1_000_000 * 1_000_000;
-        let date = words::date_and_clock(first.span.start.0);
-        format!(
-            "{}{} in {}",
-            date.map_or_else(String::new, |date| date + ", "),
-            words::offset(whole),
-            words::count(frames.len(), "window")
-        )
-    }
 }
 
 /// The timeline of topics, for readers without scripts: the player draws it as its timeline.
@@ -339,27 +334,6 @@ fn timeline(overview: &Overview) -> String {
         "<svg id=\"graph\" class=\"graph\" viewBox=\"0 0 {:.0} {:.0}\" role=\"img\" aria-label=\"Topics over time\">{inside}</svg>",
         size.w, size.h,
     )
-}
-
-/// The state of an element in one window.
-struct Still<'a> {
-    runs: &'a ViewRuns,
-    life: &'a ElementRuns,
-    window: u32,
-}
-
-impl ElementLook for Still<'_> {
-    fn class(&self) -> String {
-        let class = self.life.classes.at(self.window).unwrap_or(0);
-        self.runs.classes[class as usize].clone()
-    }
-
-    fn text(&self) -> String {
-        let lists = [&self.life.lifecycles, &self.life.rates];
-        let list = lists[usize::from(lists[0].0.is_empty())];
-        let label = list.at(self.window).unwrap_or(0);
-        self.runs.labels[label as usize].clone()
-    }
 }
 
 fn fonts() -> String {
@@ -422,11 +396,11 @@ mod tests {
         let kib = |text: &str| text.len() as f64 / 1024.0;
         let script = SCRIPT.map(squeezed).join("\n");
         assert!(
-            kib(&script) <= 54.5,
+            kib(&script) <= 58.0,
             "the script has {:.2} KiB",
             kib(&script)
         );
         let look = squeezed(LOOK);
-        assert!(kib(&look) <= 13.5, "the look has {:.2} KiB", kib(&look));
+        assert!(kib(&look) <= 14.2, "the look has {:.2} KiB", kib(&look));
     }
 }

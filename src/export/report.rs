@@ -14,12 +14,11 @@ use crate::evidence::Evidence;
 use crate::export::markdown::{self, address, code, folded, plain, row};
 use crate::export::sequence::Sequence;
 use crate::export::target::Target;
-use crate::graph::{Element, Elements, Existence, Graphs};
+use crate::graph::{Element, Existence, Graphs};
 use crate::mission::Mission;
-use crate::mission::event_log::Kind;
-use crate::mission::event_log::sentence_with;
+use crate::mission::info::summary::{Most, told};
 use crate::mission::info::{how_many, info};
-use crate::view::{Counts, Frame, Headline, View};
+use crate::view::{Frame, View};
 
 /// The most bytes of each part; together they stay below 256 KiB, a quarter of the limit of a job summary.
 const MOST_CHANGES: usize = 96 << 10;
@@ -91,71 +90,32 @@ impl ReportTimes<'_> {
     }
 }
 
-/// The first lines: the changes in short, and the bag.
+/// The first lines: the mission as one sentence, and how it is divided.
 fn verdict(sequence: &Sequence<'_>, view: &View) -> String {
     let title = title(sequence);
-    let (Some(first), Some(last)) = (view.frames.first(), view.frames.last()) else {
+    let Some(first) = view.frames.first() else {
         return format!("**{}**: no windows.", plain(&title));
-    };
-    let counts = view
-        .frames
-        .iter()
-        .fold(Counts::default(), |sum, f| sum + f.counts);
-    let headline_counts = headline_counts(&counts);
-    let said = if headline_counts.is_empty() {
-        "nothing changed".to_owned()
-    } else {
-        headline_counts.join(", ")
     };
     let changed = (0..view.frames.len())
         .filter(|k| view.is_changed(*k))
         .count();
+    let of_them = (changed > 0).then(|| format!(", {changed} of them with changes"));
     let lengths = words::period(first.span.nanos());
     let date = words::date_and_clock(first.span.start.0);
     format!(
-        "**{}**: {said}.\n\n{}{}, in {} of {lengths}{}.",
+        "**{}**: {}.\n\n{}{} of {lengths}{}.",
         plain(&title),
-        words::duration(last.span.end.since(first.span.start)),
-        date.map_or_else(String::new, |date| format!(" from {date}")),
+        plain(&info(sequence.mission).summary),
+        date.map_or_else(String::new, |date| format!("From {date}, in ")),
         words::count(view.frames.len(), "window"),
-        if changed == 0 {
-            String::new()
-        } else {
-            format!(", {changed} of them with changes")
-        },
+        of_them.unwrap_or_default(),
     )
 }
 
 fn title(sequence: &Sequence<'_>) -> String {
-    let bag = || {
-        sequence
-            .mission
-            .bags
-            .first()
-            .map_or(String::new(), |b| b.name.clone())
-    };
+    let bags = &sequence.mission.bags;
+    let bag = || bags.first().map_or(String::new(), |b| b.name.clone());
     sequence.picture.title().map_or_else(bag, str::to_owned)
-}
-
-/// The number of headlines of all windows, as text.
-fn headline_counts(counts: &Counts) -> Vec<String> {
-    let all = [
-        (counts.nodes_added, "node", " started"),
-        (counts.nodes_removed, "node", " stopped"),
-        (counts.restarted, "node", " restarted"),
-        (counts.handed_over, "topic", " handed over"),
-        (counts.silent, "silence", ""),
-        (counts.topics_added, "topic", " appeared"),
-        (counts.topics_removed, "topic", " vanished"),
-        (counts.edges_added, "connection", " made"),
-        (counts.edges_removed, "connection", " ended"),
-        (counts.values, "state", " changed"),
-        (counts.rates, "rate", " changed"),
-    ];
-    let present = all.iter().filter(|(n, _, _)| *n > 0);
-    present
-        .map(|(n, word, what)| words::count(*n, word) + what)
-        .collect()
 }
 
 fn notices(notices: &Notices) -> String {
@@ -190,10 +150,11 @@ fn folded_table(summary: &str, heads: &[&str], rows: Vec<String>, most: usize) -
     table.map_or_else(String::new, |table| folded(summary, &table))
 }
 
-/// The most names listed per kind.
-const MOST_NAMES: usize = 12;
-/// The most events of a window that are listed separately.
-const MOST_LISTED: usize = 12;
+/// All kinds of changes of a window; the rest of a kind is counted.
+const MOST_TOLD: Most = Most {
+    kinds: usize::MAX,
+    elements: 12,
+};
 
 /// The phases, collapsed; nothing if there is only one.
 fn phases(mission: &Mission, times: &ReportTimes<'_>) -> String {
@@ -227,56 +188,11 @@ fn changes(mission: &Mission, view: &View, times: &ReportTimes<'_>) -> String {
     table.map_or(String::new(), |table| table + "\n") + &rest
 }
 
-/// The kinds of headlines that are grouped, with their labels.
-const TOGETHER: [(Kind, &str, &str); 5] = [
-    (Kind::Started, "node", "started"),
-    (Kind::Stopped, "node", "stopped"),
-    (Kind::Restarted, "node", "restarted"),
-    (Kind::Appeared, "connection", "made"),
-    (Kind::Vanished, "connection", "ended"),
-];
-
-/// The changes of a window as Markdown: `2 nodes started: /a, /b; /t handed over: /a → /b`.
+/// The changes of a window.
 fn changes_of(mission: &Mission, frame: &Frame) -> String {
-    let elements = &mission.elements;
-    let mut parts = Vec::new();
-    for (kind, word, what) in TOGETHER {
-        let of_kind = frame.headlines.iter().filter(|h| h.kind == kind);
-        let all: Vec<&Headline> = of_kind.filter(|h| is_together(h)).collect();
-        if !all.is_empty() {
-            let names: Vec<String> = all.iter().map(|h| plain(&name(elements, h.what))).collect();
-            let count = words::count(all.len(), word);
-            let names = words::some_of(&names, MOST_NAMES);
-            parts.push(format!("{count} {what}: {names}"));
-        }
-    }
-    let rest: Vec<&Headline> = frame.headlines.iter().filter(|h| !is_together(h)).collect();
-    for headline in rest.iter().take(MOST_LISTED) {
-        let event = mission.log.events.get(headline.event);
-        parts.extend(event.map(|event| plain(&sentence_with(mission, &[], event))));
-    }
-    if rest.len() > MOST_LISTED {
-        parts.push(format!("and {} more", rest.len() - MOST_LISTED));
-    }
-    parts.join("; ")
-}
-
-/// Whether headlines of this kind are grouped; topics of unknown publishers appear and vanish separately.
-fn is_together(headline: &Headline) -> bool {
-    let kinds = TOGETHER.iter().any(|(kind, ..)| *kind == headline.kind);
-    kinds && !headline.what.is_topic()
-}
-
-/// The name of an element: the role of a node, the name of a topic, both ends of an edge.
-fn name(elements: &Elements, what: Element) -> String {
-    let (node, topic) = elements.ends(what);
-    let node = node.map(|id| &*elements.nodes[id].role);
-    let topic = topic.map(|id| elements.topics[id].name.as_str());
-    match (node, topic, what) {
-        (Some(node), Some(topic), Element::Subscribe(_)) => format!("{topic} → {node}"),
-        (Some(node), Some(topic), _) => format!("{node} → {topic}"),
-        (node, topic, _) => node.or(topic).unwrap_or_default().to_owned(),
-    }
+    let events = frame.headlines.iter().map(|headline| headline.event);
+    let events = events.filter_map(|id| Some((id, mission.log.events.get(id)?)));
+    plain(&told(mission, &events.collect::<Vec<_>>(), MOST_TOLD))
 }
 
 /// The number of windows that contain an element, with its messages and the sum of its rates in them.

@@ -1,8 +1,10 @@
 //! The summary of a bag: its contents, the known graph with its evidence, and missing information. In comes a mission,
-//! out goes an [`Info`], as JSON or text. Begin with [`info`], which fills it; `text` writes it, `survey` has one per bag.
+//! out goes an [`Info`], as JSON or text. Begin with [`info`], which fills it; `text` writes it, `survey` has one per bag,
+//! `summary` puts it into one sentence.
 
 mod advice;
 mod figure;
+pub(crate) mod summary;
 mod survey;
 mod text;
 mod why;
@@ -34,6 +36,8 @@ use crate::mission::Mission;
 pub struct Info {
     /// Always `bagreel.info/1`.
     pub schema: &'static str,
+    /// The mission as one sentence.
+    pub summary: String,
     /// The bags of the mission.
     pub bags: Vec<Report>,
     /// The first log time, ns since 1970.
@@ -206,6 +210,7 @@ pub fn info(mission: &Mission) -> Info {
     });
     let mut info = Info {
         schema: "bagreel.info/1",
+        summary: String::new(),
         bags: mission.bags.clone(),
         start_ns: mission.span.start.0,
         end_ns: mission.span.end.0,
@@ -227,6 +232,7 @@ pub fn info(mission: &Mission) -> Info {
         undrawn: mission.undrawn.clone(),
         notices: mission.notices.iter().map(|n| n.text).collect(),
     };
+    info.summary = summary::summary(mission, &info);
     info.advice = advice(&info, is_ros1(mission));
     info
 }

@@ -590,26 +590,6 @@ impl Counts {
     }
 }
 
-impl std::ops::Add for Counts {
-    type Output = Self;
-
-    fn add(self, other: Self) -> Self {
-        Self {
-            nodes_added: self.nodes_added + other.nodes_added,
-            nodes_removed: self.nodes_removed + other.nodes_removed,
-            topics_added: self.topics_added + other.topics_added,
-            topics_removed: self.topics_removed + other.topics_removed,
-            edges_added: self.edges_added + other.edges_added,
-            edges_removed: self.edges_removed + other.edges_removed,
-            restarted: self.restarted + other.restarted,
-            silent: self.silent + other.silent,
-            handed_over: self.handed_over + other.handed_over,
-            rates: self.rates + other.rates,
-            values: self.values + other.values,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

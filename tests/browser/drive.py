@@ -1,7 +1,7 @@
 """Drives a page in headless Chromium and Firefox: clicks, types, slides, and reads its text and the console.
 
-usage: drive.py PAGE.html EVOLUTION.json HOSTILE.html ANIMATION.svg FOLDED.html TOPIC_TIMELINE.html REPORT.md
-All but the hostile page are of the evolution, whose every window is compared with the page.
+usage: drive.py PAGE.html EVOLUTION.json HOSTILE.html ANIMATION.svg FOLDED.html TOPIC_TIMELINE.html REPORT.md QUIET.html
+All but the hostile and the quiet page are of the evolution, whose every window is compared with the page.
 """
 
 import base64
@@ -19,6 +19,7 @@ import choose
 import firefox
 import folded
 import sight
+import told
 import touch
 import webdriver
 from webdriver import Browser
@@ -393,7 +394,7 @@ def is_there(tool):
     return not reason
 
 
-def main(page, evolution, hostile_page, svg, folded_page, topic_timeline, report):
+def main(page, evolution, hostile_page, svg, folded_page, topic_timeline, report, quiet):
     if not is_there(webdriver):
         return
     path = pathlib.Path(page).resolve()
@@ -410,6 +411,7 @@ def main(page, evolution, hostile_page, svg, folded_page, topic_timeline, report
     choose.check(url(page), url(topic_timeline), evolution)
     touch.check(url(page))
     sight.check(url(page), url(folded_page), url(topic_timeline))
+    told.check(url(page), url(topic_timeline), url(quiet), evolution, headlines(evolution))
     if is_there(axe):
         axe.check(url(page), url(topic_timeline), report)
     if is_there(firefox):

@@ -16,34 +16,20 @@ use crate::view::{ArrowId, ItemId, Mark, View};
 /// A graph in SVG.
 #[derive(Debug)]
 pub(crate) struct Classes<'a> {
-    view: &'a View,
-    union: &'a Union,
+    pub(crate) view: &'a View,
+    pub(crate) union: &'a Union,
 }
 
-/// The parts of an element's group that depend on the window: its class, its live text and more.
-pub(crate) trait ElementLook {
+/// The parts of an element's group that depend on the window.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ElementLook<'a> {
     /// The words of its class attribute, after `node`, `topic` or `edge`.
-    fn class(&self) -> String;
+    pub(crate) class: &'a str,
     /// The words of its live text.
-    fn text(&self) -> String;
-    /// Writes its live text at a position, as one or more elements; `shows_changes` if it is shown only in
-    /// windows in which its rate changed.
-    fn live(&self, xml: &mut Xml, (x, y): (i64, i64), shows_changes: bool) {
-        xml.open("text")
-            .attribute("class", if shows_changes { "r c" } else { "r" })
-            .attribute("x", x)
-            .attribute("y", y)
-            .text(&self.text())
-            .close();
-    }
+    pub(crate) text: &'a str,
 }
 
-impl<'a> Classes<'a> {
-    /// The graph of a view whose union is `union`.
-    pub(crate) fn new(view: &'a View, union: &'a Union) -> Self {
-        Self { view, union }
-    }
-
+impl Classes<'_> {
     /// Writes the boxes around namespaces.
     pub(crate) fn spaces(&self, xml: &mut Xml) {
         for space in &self.union.spaces {
@@ -55,32 +41,29 @@ impl<'a> Classes<'a> {
     }
 
     /// Writes an arrow of the view.
-    pub(crate) fn arrow(&self, xml: &mut Xml, id: ArrowId, look: &dyn ElementLook) {
+    pub(crate) fn arrow(&self, xml: &mut Xml, id: ArrowId, look: ElementLook<'_>) {
         let (part, arrow) = (&self.union.arrows[id.at()], &self.view.arrows[id]);
-        let name = |id: ItemId| &*self.view.items[id].name;
-        let ends = [("from", name(arrow.from)), ("to", name(arrow.to))];
         let what = format!("edge {}", arrow.class());
-        Self::element(xml, part, &what, &ends, look, 0.8);
+        Self::element(xml, part, &what, None, look);
     }
 
     /// Writes an item of the view.
-    pub(crate) fn item(&self, xml: &mut Xml, id: ItemId, look: &dyn ElementLook) {
+    pub(crate) fn item(&self, xml: &mut Xml, id: ItemId, look: ElementLook<'_>) {
         let (part, item) = (&self.union.items[id.at()], &self.view.items[id]);
-        Self::element(xml, part, item.class(), &[("name", &item.name)], look, 1.0);
+        Self::element(xml, part, item.class(), Some(&item.name), look);
     }
 
     fn element(
         xml: &mut Xml,
         part: &UnionElement,
         what: &str,
-        data: &[(&str, &str)],
-        look: &dyn ElementLook,
-        scale: f64,
+        name: Option<&str>,
+        look: ElementLook<'_>,
     ) {
-        let class = format!("{what} {}", look.class());
+        let class = format!("{what} {}", look.class);
         xml.open("g").attribute("class", class.trim_end());
-        for (key, value) in data {
-            xml.attribute(format_args!("data-{key}"), value);
+        if let Some(name) = name {
+            xml.attribute("data-name", name);
         }
         Self::pieces(xml, &part.group, Some((part, look)));
         for mark in &part.marks {
@@ -89,20 +72,14 @@ impl<'a> Classes<'a> {
             xml.open("use")
                 .attribute("href", format_args!("#{word}"))
                 .attribute("class", word);
-            let (x, y) = (whole(x), whole(y));
-            if scale < 1.0 {
-                let place = format_args!("translate({x} {y}) scale({scale})");
-                xml.attribute("transform", place);
-            } else {
-                xml.attribute("x", x).attribute("y", y);
-            }
+            xml.attribute("x", whole(x)).attribute("y", whole(y));
             xml.close_empty();
         }
         xml.close().raw("\n");
     }
 
     /// Writes shapes and texts; for an element, with its bar after its shapes, and its live text last.
-    fn pieces(xml: &mut Xml, group: &Group, element: Option<(&UnionElement, &dyn ElementLook)>) {
+    fn pieces(xml: &mut Xml, group: &Group, element: Option<(&UnionElement, ElementLook<'_>)>) {
         let is_text = |p: &&Piece| matches!(p, Piece::Text(_));
         let texts = group.pieces.iter().filter(is_text).count();
         let mut seen = 0;
@@ -119,7 +96,14 @@ impl<'a> Classes<'a> {
             seen += 1;
             let place = (whole(text.at.x), whole(text.at.y));
             if let Some((part, look)) = element.filter(|(part, _)| part.is_live && seen == texts) {
-                look.live(xml, place, part.shows_changes);
+                // Some are shown only in windows in which the rate changed.
+                let class = if part.shows_changes { "r c" } else { "r" };
+                xml.open("text").attribute("class", class);
+                let (x, y) = place;
+                xml.attribute("x", x)
+                    .attribute("y", y)
+                    .text(look.text)
+                    .close();
                 continue;
             }
             let name = element.and_then(|(part, _)| part.name.as_ref());
@@ -181,30 +165,9 @@ pub(crate) fn badge_shapes(xml: &mut Xml, style: &Style, mark: Mark) {
     for (at, piece) in sign.pieces.iter().enumerate() {
         let Piece::Shape(shape) = piece else { continue };
         let pen = if shape.stroke.width > 0.0 { "p" } else { "f" };
-        fine(xml, &shape.form, if at == 0 { "b" } else { pen });
+        Classes::form(xml, &shape.form, Some(if at == 0 { "b" } else { pen }));
     }
     xml.close();
-}
-
-/// Writes a badge's shape, to a tenth of a pixel.
-fn fine(xml: &mut Xml, form: &Form, class: &str) {
-    match form {
-        Form::Ellipse(r) => {
-            xml.open("circle")
-                .attribute("class", class)
-                .attribute("cx", tenth(r.centre().x))
-                .attribute("cy", tenth(r.centre().y))
-                .attribute("r", tenth(r.w / 2.0))
-                .close_empty();
-        }
-        Form::Path(steps) => {
-            xml.open("path")
-                .attribute("class", class)
-                .attribute("d", path(steps, 10))
-                .close_empty();
-        }
-        Form::Rect(..) => {}
-    }
 }
 
 /// Rounds to whole pixels; a value that is not a finite number becomes 0.

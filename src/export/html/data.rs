@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::element_runs::ElementRuns;
+use super::told::{PageClock, Told, ToldWindow};
 use super::{HtmlPage, PageGraph};
 use crate::base::cast;
 use crate::base::digest;
@@ -12,18 +13,15 @@ use crate::base::geometry::Rect;
 use crate::base::time::Stamp;
 use crate::base::words;
 use crate::base::words::visible;
-use crate::draw::picture::change_counts;
 use crate::draw::picture::title::SIDES;
 use crate::draw::timeline::Timeline;
 use crate::draw::timeline::marks::{RowMark, Sign};
 use crate::draw::timeline::rows::{Level, Row};
 use crate::evidence::Evidence;
 use crate::graph::{Element, Elements, Id as _};
-use crate::mission::event_log::Kind;
-use crate::mission::event_log::sentence;
 use crate::mission::info::is_ros1;
 use crate::mission::{EventId, Mission};
-use crate::view::{Arrow, ArrowKind, Frame, Item};
+use crate::view::{Arrow, ArrowKind, Item};
 
 /// The number of bytes from which on data is deflated.
 const LONG: usize = 1_000_000;
@@ -42,11 +40,10 @@ struct PageData<'a> {
     /// The start and the end of each window.
     starts: Vec<f64>,
     ends: Vec<f64>,
-    /// Milliseconds since 1970 at the start of the first window, and the date.
+    /// Milliseconds since 1970 at the start of the first window.
     epoch: i64,
-    date: String,
     /// The headlines of each window that has any.
-    reported: Vec<ReportedData>,
+    reported: &'a [ToldWindow],
     /// Start, end and name of each phase.
     phases: Vec<(f64, f64, String)>,
     /// The lifelines, from top to bottom.
@@ -88,53 +85,36 @@ struct GraphData<'a> {
     members: Vec<Vec<u32>>,
 }
 
-/// The headlines of a window, and the elements that are back in it: its index, the number of headlines, the
-/// texts of the three badges, and for each of the first [`MOST_REPORTED`] headlines its time, its sign (0
-/// appeared, 1 vanished, 2 changed), its element (-1 for one that is not drawn), its text, its index in the
-/// log.
-#[derive(Serialize)]
-struct ReportedData(
-    usize,
-    usize,
-    [String; 3],
-    Vec<(f64, u8, i64, String, EventId)>,
-);
-
 /// A lifeline: its element (-1 for a namespace's title), its name, 1 below such a title, its lifetimes as
 /// `[start, end, 1 by inference only, …]`, its times of publishing as `[start, end, ninths of its highest
 /// rate, …]`, and its events as their times, signs and indices in the log.
 #[derive(Serialize)]
 struct RowData(i64, String, u8, Vec<f64>, Vec<f64>, Vec<(f64, u8, EventId)>);
 
-/// The most headlines of one window that are listed.
-const MOST_REPORTED: usize = 200;
-
 /// The data as JSON that is safe between the tags of a page.
-pub(super) fn json(page: &HtmlPage<'_>, still: usize) -> String {
+pub(super) fn json(page: &HtmlPage<'_>, still: usize, told: &Told) -> String {
     let whole = &page.whole;
     let mission = page.sequence.mission;
     let frames = &whole.view.frames;
-    let clock = PageClock(frames.first().map_or(Stamp(0), |f| f.span.start));
-    let places = places(whole);
+    let (clock, places) = (told.clock, &told.places);
     let mut words = Words::default();
-    let mut graphs = vec![graph(page, whole, &places, clock, &mut words)];
+    let mut graphs = vec![graph(page, whole, places, clock, &mut words)];
     graphs.extend(
         page.folded
             .as_ref()
-            .map(|folded| graph(page, folded, &places, clock, &mut words)),
+            .map(|folded| graph(page, folded, places, clock, &mut words)),
     );
     let style = page.style;
-    let lives = page.sequence.unfolded.and_then(|u| u.lives);
+    let lives = told.lives.as_ref();
     let data = PageData {
         graphs,
         words: words.list,
         starts: frames.iter().map(|f| clock.secs(f.span.start)).collect(),
         ends: frames.iter().map(|f| clock.secs(f.span.end)).collect(),
         epoch: clock.0.0.div_euclid(1_000_000),
-        date: words::date(clock.0.0).unwrap_or_default(),
-        reported: reported(page, &places, clock),
+        reported: &told.windows,
         phases: phases(mission, clock),
-        rows: lives.map_or_else(Vec::new, |lives| rows(lives, &places, clock)),
+        rows: lives.map_or_else(Vec::new, |lives| rows(lives, told)),
         takeovers: lives.map_or_else(Vec::new, |lives| takeovers(lives, clock)),
         sizes: [
             style.edge.size.min(style.topic.small).min(style.node.small),
@@ -153,30 +133,6 @@ pub(super) fn json(page: &HtmlPage<'_>, still: usize) -> String {
         json = json.replace(from, to);
     }
     json
-}
-
-/// The origin of times in seconds.
-#[derive(Clone, Copy)]
-struct PageClock(Stamp);
-
-impl PageClock {
-    /// The seconds from the origin to `at`, rounded down to milliseconds, as everywhere.
-    fn secs(self, at: Stamp) -> f64 {
-        at.since(self.0).div_euclid(1_000_000) as f64 / 1e3
-    }
-}
-
-/// The element that represents each node, topic and edge.
-fn places(drawn: &PageGraph<'_>) -> BTreeMap<Element, u32> {
-    let mut places = BTreeMap::new();
-    let items = drawn.view.items.iter().map(|item| &item.members);
-    let arrows = drawn.order.iter().map(|id| &drawn.view.arrows[*id].members);
-    for (members, place) in items.chain(arrows).zip(0..) {
-        for member in members {
-            places.entry(*member).or_insert(place);
-        }
-    }
-    places
 }
 
 fn graph<'a>(
@@ -232,73 +188,25 @@ fn graph<'a>(
     }
 }
 
-fn reported(
-    page: &HtmlPage<'_>,
-    places: &BTreeMap<Element, u32>,
-    clock: PageClock,
-) -> Vec<ReportedData> {
-    let mission = page.sequence.mission;
-    let frames = page.whole.view.frames.iter().enumerate();
-    let frames = frames.filter(|(_, frame)| frame.is_changed());
-    let parts = mission.log.all_parts();
-    let reported = |(at, frame): (usize, &Frame)| {
-        let mut counts = change_counts(&frame.counts).map(|(text, _)| text);
-        let place = |what: &Element| places.get(what).map_or(-1, |at| i64::from(*at));
-        let returns: Vec<_> = frame
-            .lasting
-            .iter()
-            .filter_map(|last| {
-                let (end, away) = (last.ended?, last.ended?.since(last.since));
-                let (node, topic) = mission.elements.names(last.what);
-                let name = visible(node.or(topic).unwrap_or_default());
-                let text = format!("{name} is back after {}", words::duration(away));
-                Some((clock.secs(end), 2, place(&last.what), text, last.event))
-            })
-            .collect();
-        if frame.headlines.is_empty() {
-            counts[2] = format!("{} back", returns.len());
-        }
-        let lines = frame
-            .headlines
-            .iter()
-            .take(MOST_REPORTED)
-            .filter_map(|headline| {
-                let event = mission.log.events.get(headline.event)?;
-                let what = place(&headline.what);
-                let sentence = sentence(mission, &parts, headline.event, event);
-                let time = clock.secs(event.time);
-                Some((time, sign(event.kind), what, sentence, headline.event))
-            })
-            .chain(returns);
-        ReportedData(at, frame.counts.total(), counts, lines.collect())
-    };
-    frames.map(reported).collect()
-}
-
-fn sign(kind: Kind) -> u8 {
-    match kind {
-        Kind::Started | Kind::Appeared => 0,
-        Kind::Stopped | Kind::Vanished => 1,
-        _ => 2,
-    }
-}
-
 fn phases(mission: &Mission, clock: PageClock) -> Vec<(f64, f64, String)> {
-    let phases = mission.log.phases.iter();
-    let all = phases.map(|p| {
+    let log = &mission.log;
+    // Where no event is told, phases would claim changes.
+    let is_told = log.headlines(mission.span).next().is_some();
+    let phases = log
+        .phases
+        .iter()
+        .filter(|_| is_told && log.phases.len() > 1);
+    let phases = phases.map(|p| {
         let name = visible(&p.name).into_owned();
         (clock.secs(p.span.start), clock.secs(p.span.end), name)
     });
-    if mission.log.phases.len() > 1 {
-        all.collect()
-    } else {
-        Vec::new()
-    }
+    phases.collect()
 }
 
-fn rows(timeline: &Timeline, places: &BTreeMap<Element, u32>, clock: PageClock) -> Vec<RowData> {
+fn rows(timeline: &Timeline, told: &Told) -> Vec<RowData> {
+    let clock = told.clock;
     let row = |row: &Row| {
-        let place = row.what().and_then(|what| places.get(&what));
+        let place = row.what().and_then(|what| told.places.get(&what));
         let is_inferred = f64::from(u8::from(row.is_inferred));
         let lives = row
             .lives

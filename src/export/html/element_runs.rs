@@ -1,13 +1,13 @@
 //! A mission as data for a page: per element a flat list of its values and the windows from which they apply,
 //! so that any window is found by one search.
 
-use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Serialize, Serializer};
 
 use crate::base::runs::Runs;
 use crate::base::words;
+use crate::draw::paint::classes::ElementLook;
 use crate::evidence::Confidence;
 use crate::graph::State;
 use crate::view::{Arrow, Looks, Mark, Shown, TopicRow, View};
@@ -60,34 +60,26 @@ impl ViewRuns {
             let runs = all.iter().map(|looks| recorder.runs(looks));
             runs.collect::<Vec<_>>()
         };
-        let mut items = runs(&view.items_shown, None);
-        let mut arrows = runs(&view.arrows_shown, Some(&view.arrows));
-        // The most frequent value gets the shortest number.
-        let both = || items.iter().chain(&arrows);
-        let new_classes = classes.by_frequency(both().flat_map(|l| &l.classes.0));
-        let texts =
-            |l: &'_ ElementRuns| [&l.rates.0[..], &l.lifecycles.0, &l.turns.0, &l.hertz.0].concat();
-        let all_texts: Vec<(u32, u32)> = both().flat_map(texts).collect();
-        let new_labels = labels.by_frequency(&all_texts);
-        for life in items.iter_mut().chain(&mut arrows) {
-            renumber(&mut life.classes, &new_classes);
-            renumber(&mut life.rates, &new_labels);
-            renumber(&mut life.lifecycles, &new_labels);
-            renumber(&mut life.turns, &new_labels);
-            renumber(&mut life.hertz, &new_labels);
-        }
+        let items = runs(&view.items_shown, None);
+        let arrows = runs(&view.arrows_shown, Some(&view.arrows));
         Self {
-            classes: classes.sorted(&new_classes, |class| {
-                class.map_or("off".to_owned(), LookClass::words)
-            }),
-            labels: labels.sorted(&new_labels, Clone::clone),
+            classes: classes.list(|class| class.map_or("off".to_owned(), LookClass::words)),
+            labels: labels.list(Clone::clone),
             items,
             arrows,
         }
     }
-}
 
-impl ViewRuns {
+    /// The look of an element in a window.
+    pub(crate) fn look(&self, life: &ElementRuns, window: u32) -> ElementLook<'_> {
+        let lists = [&life.lifecycles, &life.rates];
+        let list = lists[usize::from(lists[0].0.is_empty())];
+        ElementLook {
+            class: &self.classes[life.classes.at(window).unwrap_or(0) as usize],
+            text: &self.labels[list.at(window).unwrap_or(0) as usize],
+        }
+    }
+
     /// All class words that occur.
     pub(crate) fn words(&self) -> BTreeSet<&str> {
         self.classes
@@ -156,33 +148,12 @@ impl<T: Ord + Clone> ValueTable<T> {
         *self.places.entry(value).or_insert(next)
     }
 
-    /// The new index of each old one: the first stays, then by frequency, then by age.
-    fn by_frequency<'a>(&self, runs: impl IntoIterator<Item = &'a (u32, u32)>) -> Vec<u32> {
-        let mut uses = vec![0_u64; self.places.len()];
-        for (_, value) in runs {
-            uses[*value as usize] += 1;
-        }
-        let mut order: Vec<usize> = (0..uses.len()).collect();
-        order.sort_by_key(|old| (*old > 0, Reverse(uses[*old])));
-        let mut new = vec![0; uses.len()];
-        for (place, old) in (0..).zip(order) {
-            new[old] = place;
-        }
-        new
-    }
-
-    fn sorted(&self, new: &[u32], write: impl Fn(&T) -> String) -> Vec<String> {
-        let mut out = vec![String::new(); new.len()];
-        for (value, old) in &self.places {
-            out[new[*old as usize] as usize] = write(value);
+    fn list(&self, write: impl Fn(&T) -> String) -> Vec<String> {
+        let mut out = vec![String::new(); self.places.len()];
+        for (value, place) in &self.places {
+            out[*place as usize] = write(value);
         }
         out
-    }
-}
-
-fn renumber(runs: &mut Runs<u32>, new: &[u32]) {
-    for (_, value) in &mut runs.0 {
-        *value = new[*value as usize];
     }
 }
 
@@ -367,12 +338,5 @@ mod tests {
             ["7.1", "0.0", "7.1"]
         );
         assert_eq!([0, 1, 2].map(|w| text(&item.hertz, w)), ["0", "0", "0"]);
-    }
-
-    #[test]
-    fn the_most_frequent_class_has_the_shortest_number() {
-        let (slow, fast) = (Some((None, 1.0)), Some((None, 1000.0)));
-        let runs = runs(&[slow, None, fast, None, fast, None, fast]);
-        assert_eq!(runs.classes, ["off", "active w6", "active w1"]);
     }
 }

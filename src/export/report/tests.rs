@@ -3,25 +3,6 @@ use crate::view::testing::mission;
 use crate::view::{ViewOptions, view};
 
 #[test]
-fn the_first_line_is_a_summary() {
-    let (view, _) = view(
-        &mission(&["/a>/t@2", "/a>/t@2 /b</t", "/a>/t@2"]),
-        &ViewOptions::default(),
-    );
-    let counts = headline_counts(
-        &view
-            .frames
-            .iter()
-            .fold(Counts::default(), |sum, f| sum + f.counts),
-    );
-    assert!(
-        counts.contains(&"1 node started".to_owned())
-            && counts.contains(&"1 node stopped".to_owned()),
-        "{counts:?}"
-    );
-}
-
-#[test]
 fn only_what_changed_and_its_neighbours_are_drawn() {
     let (view, _) = view(
         &mission(&["/a>/t@2 /x>/y@1", "/a>/t@2 /b</t /x>/y@1"]),

@@ -45,6 +45,7 @@ fn undrawn(out: &mut String, info: &Info) -> std::fmt::Result {
 }
 
 fn head(out: &mut String, info: &Info) -> std::fmt::Result {
+    writeln!(out, "{}\n", info.summary)?;
     for bag in &info.bags {
         let how = bag
             .tier_reason

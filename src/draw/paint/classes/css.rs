@@ -171,7 +171,7 @@ fn badges(out: &mut String, style: &Style) {
     let _ = write!(
         out,
         ".badge{{visibility:inherit}}.b{{stroke:{};stroke-width:1.2}}.p{{fill:none;stroke:{s};stroke-width:2}}\
-         .f{{fill:{s};stroke:none}}use{{fill:{}}}use.added{{fill:{}}}use.removed{{fill:{}}}",
+         .f{{fill:{s};stroke:none}}use{{fill:{}}}.edge>use{{scale:.8;transform-box:fill-box;transform-origin:center}}use.added{{fill:{}}}use.removed{{fill:{}}}",
         style.badge.halo,
         style.changed.color,
         style.added.color,

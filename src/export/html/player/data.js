@@ -47,6 +47,7 @@ class Graph {
 			const [x, y, w, h] = ['x', 'y', 'width', 'height'].map(key => +frame.querySelector('rect').getAttribute(key));
 			return [frame, [...names.keys()].filter(i => boxes[i][0] >= x - 1 && boxes[i][1] >= y - 1 && boxes[i][0] + boxes[i][2] <= x + w + 1 && boxes[i][1] + boxes[i][3] <= y + h + 1)];
 		}).filter(([, inside]) => inside.length);
+		this.els.slice(this.N).forEach((e, k) => { [e.dataset.from, e.dataset.to] = arrows[k].map(i => names[i]); });
 		this.base = this.els.map(e => e.classList[0] + ' ');
 		this.live = this.els.map(e => e.querySelector('.r'));
 		this.cur = this.els.map(() => '');
@@ -122,4 +123,4 @@ class Graph {
 }
 const whole = new Graph(data.graphs[0], document.querySelector('#graph .items') && $.graph);
 const folded = data.graphs[1] && new Graph(data.graphs[1], $.folded);
-const headlines = new Map(reported.map(([w, n, counts, lines]) => [w, { n, counts, lines }]));
+const headlines = new Map(reported.map(([w, n, counts, lines, words]) => [w, { n, counts, lines, words }]));

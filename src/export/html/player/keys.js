@@ -14,7 +14,7 @@ function escape() {
 	if (!$.big.hidden) return enlarge(false);
 	if (!$.sheet.hidden) return table(false);
 	if ($.q.value) return clearSearch();
-	if (sel >= 0 || !$.card.hidden) return pick(-1);
+	if (sel >= 0 || !$.card.hidden) { restore(); return pick(-1); }
 	if (range) { span(null); return seek(now); }
 	if (base >= 0) compare(-1);
 }
@@ -56,7 +56,7 @@ document.addEventListener('click', e => {
 	// In a frame without its own address, a link would load the surrounding page.
 	if (a) {
 		e.preventDefault();
-		go(windowAt(parseFloat(a.hash.slice(3))));
+		visit(windowAt(parseFloat(a.hash.slice(3))));
 		if (innerWidth <= 760) stage.scrollIntoView({ block: 'start' });
 	}
 });

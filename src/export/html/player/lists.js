@@ -25,28 +25,29 @@ function element(i) {
 	const rate = differs || whole.rate(i, ...range ?? [now]);
 	return entry(i, whole.name(i) + (rate ? '  ' + rate : ''), signOf(i));
 }
+const lastChange = (before = reported.findLast(([w]) => w < now)?.[3].at(-1)) => before ? `no change since ${before[5]}` : 'no change yet';
 function listChanges() {
+	$.fresh.hidden = base < 0 && !reported.length;
 	if (base < 0) {
 		setText('changestitle', data.sides ? 'Differences' : range ? 'Changes in these windows' : 'Changes in this window');
 		const all = reported.filter(([w]) => range ? w >= range[0] && w <= range[1] : w == now);
 		const lines = all.flatMap(([w]) => linesOf(w)), n = all.reduce((sum, [, n, , lines]) => sum + n - lines.length, lines.length);
-		// Still empty.
-		if (!n && $.changes.firstChild?.textContent == 'None.') return;
-		fill('changes', lines, ([s, sign, i, text, id]) => {
-			const line = entry(i, text, KINDS[sign], data.sides ? '' : clock(Math.floor(s)));
+		fill('changes', lines, ([, sign, i, text, id, when]) => {
+			const line = entry(i, text, KINDS[sign], data.sides ? '' : when);
 			line.dataset.entry = id;
 			return line;
 		});
 		if (n > lines.length) $.changes.append(make('p', { textContent: `and ${n - lines.length} more` }));
-		if (!n) $.changes.append(make('p', { textContent: 'None.' }));
+		if (!n) $.changes.append(make('p', { textContent: lastChange() }));
 		return;
 	}
 	setText('changestitle', `Differences from window ${base + 1}`);
 	const all = marked(whole);
 	fill('changes', all, element);
-	if (!all.length) $.changes.append(make('p', { textContent: 'None.' }));
+	if (!all.length) $.changes.append(make('p', { textContent: 'no difference' }));
 }
 onSeek.push(listChanges);
+for (const [name, is] of [['quiet', !reported.length], ['single', !last]]) document.body.classList.toggle(name, is);
 
 // Search: all words must be in name or type; `a -> b` finds connections. An exact last part comes first, then
 // names that begin with the text, then names that contain it; without any, names with other separators, similar
@@ -95,11 +96,13 @@ function search() {
 	const q = $.q.value;
 	hitList = found(q);
 	hits = q ? new Set(hitList.flatMap(i => whole.nearby(i))) : null;
+	rings = new Set(hitList.flatMap(onStage));
 	if (hits && shown == folded) hits = new Set(shown.members.flatMap((inside, i) => inside.some(h => hits.has(h)) ? i : NONE).concat([...Array(shown.count - shown.N).keys()].map(k => k + shown.N)));
 	setText('count', q && (hitList.length ? `${hitList.length} found` : 'no matches'));
 	$.onlybox.hidden = !q;
 	fill('hits', hitList, element);
 	redraw();
+	drawRow();
 	save();
 }
 function clearSearch() {

@@ -1,7 +1,7 @@
 // The look of a window: classes, rates, header. `shown` is the graph on the stage, `base` the window for
 // comparison.
 let now = 0, base = -1, shown = folded ?? whole, sel = -1, timer = 0, hits = null;
-let near = new Set(), only = false, looping = false;
+let near = new Set(), rings = new Set(), only = false, looping = false;
 // A range of windows shown as one: its ends, the window at which it began, and its looks, per graph.
 let range = null, anchor = -1, rangeLooks = new Map();
 // Namespaces that the user hid.
@@ -56,9 +56,9 @@ function labelOf(g, i, w) {
 function redraw() {
 	const g = shown, moved = [];
 	g.els.forEach((e, i) => {
-		const look = classOf(g, i, now) + (isOut(g, i) ? ' without' : ''), cls = near.has(i) ? look + ' near' : look, all = hits?.has(i) ? cls + ' hit' : cls;
+		const look = classOf(g, i, now) + (isOut(g, i) ? ' without' : ''), all = look + (near.has(i) ? ' near' : '') + (hits?.has(i) ? ' hit' : '') + (rings.has(i) ? ' ring' : '');
 		if (all != g.cur[i]) {
-			if (look != g.cur[i].replace(/ (near|hit)\b/g, '')) moved.push(i);
+			if (look != g.cur[i].replace(/ (near|hit|ring)\b/g, '')) moved.push(i);
 			e.setAttribute('class', g.base[i] + (g.cur[i] = all));
 		}
 		const text = g.live[i];
@@ -107,13 +107,13 @@ function header() {
 	if (range) setText('where', `windows ${range[0] + 1} to ${range[1] + 1} of ${W} · ${rangeTimes()} of ${clock(total)} · mean rates`);
 	else setText('where', data.sides?.[now] ?? `${place} · ${clock(starts[now])} – ${clock(ends[now])} of ${clock(total)}${base < 0 ? '' : ` · compared with window ${base + 1}, ${clock(starts[base])} – ${clock(ends[base])}`}`);
 	$.clock.firstChild.textContent = iso(data.epoch / 1e3 + starts[now], 11, 19) + ' ';
-	$.clock.lastChild.textContent = data.date;
 	const p = phases.findLastIndex(([from]) => from < ends[now]);
-	setText('phase', p < 0 ? '' : `${p + 1} · ${phases[p][2]}`);
-	$.phase.title = p < 0 ? '' : `phase ${p + 1} of ${phases.length}: ${phases[p][2]}`;
+	setText('phase', p < 0 ? '' : `phase ${p + 1}: ${phases[p][2]}`);
+	setText('headline', base < 0 && !range && !without.size && headlines.get(now)?.words || lastChange());
 	// The log events that the badges count; a difference between two arbitrary windows need not be an event.
 	if (base < 0 && !range) $.counts.dataset.entries = linesOf(now).map(line => line[4]).join(' ');
 	else delete $.counts.dataset.entries;
+	$.counts.dataset.of = range ? 'this range' : base < 0 ? data.sides ? '' : 'this window' : 'compared';
 	$.counts.replaceChildren(...counts.flatMap((text, m) => text ? [make('span', { className: KINDS[m], textContent: text })] : []));
 	$.seek.value = now;
 	$.seek.ariaValueText = [clock(starts[now]), place, ...counts.filter(Boolean)].join(', ');
@@ -133,12 +133,14 @@ function go(w) {
 	span(anchor < 0 ? null : [anchor, w]);
 	seek(w);
 }
+// Goes to a window for its changes, and brings them into view.
+const visit = w => { go(w); look(); };
 // To the next window with a headline; only of the followed element, if any.
 function jump(by) {
 	const turns = $.follow.ariaPressed == 'true' && sel >= 0 ? whole.changesOf(sel) : headlines;
 	let w = now;
 	do w += by; while (w >= 0 && w < W && !turns.has(w));
-	if (w >= 0 && w < W) go(w);
+	if (w >= 0 && w < W) visit(w);
 	else { play(0); setText('live', by > 0 ? 'No later change' : 'No earlier change'); }
 }
 function compare(w) {

@@ -36,25 +36,36 @@ function load(hash = '') {
 	if (to.get('table')) table(true);
 	if (looping && !calm.matches) play(1);
 }
-// The stage as it is, with its style rules and its font.
+// The stage as it is, below the name, the time and the sentence, with its style rules and its font.
+const HEAD = 44;
 function picture() {
-	const copy = svg().cloneNode(true), [x, y, width, height] = visible();
-	set(copy, { xmlns: 'http://www.w3.org/2000/svg', width: wide, height: high, viewBox: [x, y, width, height].join(' ') });
-	const style = drawn('style', {}, [...document.querySelectorAll('style')].map(sheet => sheet.textContent).join(''));
-	copy.prepend(style, $.signs.querySelector('defs').cloneNode(true), drawn('rect', { x, y, width, height, style: `fill:${getComputedStyle(document.body).backgroundColor};stroke:none` }));
+	const copy = svg().cloneNode(true), [x, top, width, part] = visible(), unit = width / wide, y = top - HEAD * unit, height = part + HEAD * unit;
+	set(copy, { xmlns: 'http://www.w3.org/2000/svg', width: wide, height: high + HEAD, viewBox: [x, y, width, height].join(' ') });
+	const { color, backgroundColor: fill } = getComputedStyle(document.body), most = wide / 6.5;
+	copy.prepend(drawn('style', {}, [...document.querySelectorAll('style')].map(sheet => sheet.textContent).join('')), $.signs.querySelector('defs').cloneNode(true), drawn('rect', { x, y, width, height, fill }));
+	copy.append(drawn('rect', { x, y, width, height: HEAD * unit, fill }), ...[`${missionName} · ${$.where.textContent}`, $.sentence.textContent].map((text, k) =>
+		drawn('text', { x: x + 8 * unit, y: y + (18 + 18 * k) * unit, fill: color, 'font-family': 'Inter', 'font-size': 12 * unit }, text.length > most ? text.slice(0, most) + '…' : text)));
 	copy.querySelectorAll('.off').forEach(e => e.remove());
 	return new XMLSerializer().serializeToString(copy);
 }
-const fileName = kind => `${document.title.replace(/\.\w+$/, '').replace(/[^\w.-]+/g, '_')}_${clock(starts[now]).replace(/:/g, '-')}.${kind}`;
+const missionName = document.querySelector('h1').textContent;
+const fileName = kind => `${missionName.replace(/\.\w+$/, '').replace(/[^\w.-]+/g, '_')}_${clock(starts[now]).replace(/:/g, '-')}.${kind}`;
+// An answer beside the list of things to save, for two seconds.
+function tell(text) {
+	const { left, top } = $.save.getBoundingClientRect();
+	setText('live', text);
+	hover({ clientX: left, clientY: top }, [text]);
+	setTimeout(() => { $.tip.hidden = true; }, 2000);
+}
 function download(href, kind) {
 	const a = make('a', { href, download: fileName(kind) });
 	a.click();
-	setText('live', `Saved ${a.download}`);
+	tell(`Saved ${a.download}`);
 }
 async function savePicture(kind) {
 	const url = 'data:image/svg+xml;charset=utf-8,' + encodeURIComponent(picture());
 	if (kind == 'svg') return download(url, kind);
-	const image = new Image(), canvas = make('canvas', { width: wide * 2, height: high * 2 });
+	const image = new Image(), canvas = make('canvas', { width: wide * 2, height: (high + HEAD) * 2 });
 	image.src = url;
 	await image.decode();
 	canvas.getContext('2d').drawImage(image, 0, 0, canvas.width, canvas.height);
@@ -66,5 +77,5 @@ $.save.onchange = async () => {
 	$.save.blur();
 	if (what != 'link') return savePicture(what);
 	const url = location.href.split('#')[0] + link();
-	try { await navigator.clipboard.writeText(url); setText('live', 'Link copied'); } catch { setText('live', url); prompt?.('The link', url); }
+	try { await navigator.clipboard.writeText(url); tell('Link copied'); } catch { tell(url); prompt?.('The link', url); }
 };

@@ -9,16 +9,22 @@ function pick(i, look, fromList, isTimed) {
 	sel = i;
 	group = -1;
 	if (i >= 0 && look && !isTimed && !whole.isThere(i, now) && base < 0 && !range) toNearest(i);
+	if (i < 0) viewBefore = null;
+	else if (look) viewBefore ??= [shown, view];
 	if (i >= 0 && look && shown == folded && !nearOf(i).size) show(whole);
 	near = nearOf(i);
 	redraw();
 	if (i < 0) $.follow.ariaPressed = false;
 	card();
-	drawRow();
+	drawTime();
 	rowNames[rows.findIndex(([k]) => k >= 0 && k == i)]?.scrollIntoView({ block: 'nearest' });
 	if (look && i >= 0) {
 		bring(onStage(i), Math.max(scaleOf(view), TOPIC), 1.5);
 		if (fromList && innerWidth <= 760) stage.scrollIntoView({ block: 'start' });
+	}
+	if (i >= 0 && innerWidth > 760) {
+		if (!sideIsOpen()) choose(side, true);
+		$.card.scrollIntoView({ block: 'nearest' });
 	}
 	save();
 }
@@ -32,7 +38,15 @@ function toNearest(i) {
 	}
 }
 // A box of the picture that represents several elements: its members, and how to expand it.
-let group = -1, viewBefore;
+let group = -1;
+// The graph and the view before a selection, to which Escape returns unless the user moved since.
+let viewBefore = null;
+function restore() {
+	const [g, box] = viewBefore ?? [shown, view];
+	viewBefore = null;
+	show(g);
+	fit(box);
+}
 function pickGroup(i) {
 	pick(-1);
 	group = i;
@@ -49,13 +63,13 @@ function pin() {
 // collapses it again and restores the previous view.
 function unfold() {
 	if (shown == whole) {
-		show(folded);
-		fit(viewBefore ?? homeOf());
+		viewBefore ??= [folded, folded.home];
+		restore();
 		return pin();
 	}
 	const k = scaleOf(view), [x, y, w, h] = folded.boxes[group], inside = folded.members[group].filter(i => i < whole.N);
 	const there = [wide / 2 + k * (x + w / 2 - view[0] - view[2] / 2), high / 2 + k * (y + h / 2 - view[1] - view[3] / 2)];
-	viewBefore = view;
+	viewBefore = [folded, view];
 	show(whole);
 	bring(inside, TOPIC);
 	pin();
@@ -100,7 +114,7 @@ function card() {
 	setText('endstitle', group < 0 ? 'Connected' : 'Members');
 	const past = reported.flatMap(([w, , , lines]) => lines.filter(line => group < 0 ? line[2] == sel : folded.members[group].includes(line[2])).map(line => [w, ...line]));
 	$.history.hidden = !past.length;
-	fill('past', past, ([w, s, sign, , text]) => make('button', { className: KINDS[sign], onclick: () => go(w) }, make('b', { textContent: data.sides ? '' : clock(Math.floor(s)) + ' ' }), text), 12);
+	fill('past', past, ([w, , sign, , text, , when]) => make('button', { className: KINDS[sign], onclick: () => go(w) }, make('b', { textContent: data.sides ? '' : when + ' ' }), text), 12);
 	fill('ends', group < 0 ? whole.ends(sel) : folded.members[group], element);
 }
 function drawLifeline(runs, classes) {
@@ -149,9 +163,9 @@ const elementAt = e => shown.dom.get(e.target.closest?.('.items > g, .arrows > g
 stage.addEventListener('pointermove', e => {
 	const i = e.pointerType == 'touch' || e.buttons ? -1 : elementAt(e);
 	if (i < 0) $.tip.hidden = true;
-	else hover(e, explain(shown, i));
+	else hover(e, explain(shown, i).slice(0, 2));
 });
-stage.addEventListener('pointerleave', () => { $.tip.hidden = true; });
+for (const event of ['pointerleave', 'pointerdown']) stage.addEventListener(event, () => { $.tip.hidden = true; });
 for (const g of [whole, folded]) if (g?.svg) g.svg.onclick = e => {
 	if (far > 5) return;
 	const i = elementAt(e), same = i < 0 ? -1 : wholeOf(i);

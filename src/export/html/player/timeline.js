@@ -1,8 +1,9 @@
 // The timeline: phases, changes and lifelines at their exact times, and the playhead over the current window.
-const ROW = isTopicTimeline ? 20 : 14, part = s => s / long, percent = s => 100 * part(s) + '%';
-let rowHeight = ROW, beforePrint;
+const part = s => s / long, percent = s => 100 * part(s) + '%';
+// The height of a row, whether its name is shown, and whether rows without events are folded.
+let rowHeight = 14, hasNames = true, isFolded = false, showsAll = false, beforePrint;
 phases.forEach(([from, to, name], p) => {
-	const button = make('button', { textContent: `${p + 1} · ${name}`, title: `phase ${p + 1}: ${name}, ${clock(from)} – ${clock(to)}`, onclick: () => go(windowAt(from)) });
+	const button = make('button', { textContent: `${p + 1} · ${name}`, title: `phase ${p + 1}: ${name}, ${clock(from)} – ${clock(to)}`, onclick: () => visit(windowAt(from)) });
 	button.style.left = percent(from);
 	button.style.width = percent(to - from);
 	$.band.append(button);
@@ -13,13 +14,15 @@ const rowNames = rows.map(([i, label, inside]) => i < 0
 	? make('div', { className: inside ? 'inside' : 'space', textContent: label, title: label })
 	: make('button', { className: inside ? 'inside' : '', title: whole.name(i), onclick: () => pick(i, 1) },
 		...isTopicTimeline ? [make('span', { textContent: label }), make('span', { className: 'type', textContent: whole.type(i).slice(5), title: whole.type(i) }), make('span', { className: 'hz' })] : [label]));
-$.rownames.append(...rowNames);
+const quiet = rows.map(([i, , , , , events], r) => i >= 0 && !events.length && !takeovers.some(([, a, b]) => a == r || b == r));
+const folder = make('button', { className: 'more', onclick: () => { showsAll = !showsAll; drawTime(); } });
+$.rownames.append(...rowNames, ...isTopicTimeline ? [] : [folder]);
 const showRates = () => isTopicTimeline && rows.forEach(([i], r) => {
 	if (i >= 0) rowNames[r].lastChild.textContent = whole.rate(i, ...range ?? [now]) || '–';
 });
 onSeek.push(showRates);
 // The position of each row; rows of hidden namespaces have none.
-const isRowOut = ([i, , inside], r) => i >= 0 ? isOut(whole, i) : isTitleOut(r);
+const isRowOut = ([i, , inside], r) => i >= 0 ? isOut(whole, i) || isFolded && quiet[r] && i != sel : isTitleOut(r);
 // A title without any rows below it is hidden, too.
 function isTitleOut(r) {
 	let k = r + 1;
@@ -34,33 +37,42 @@ const markOf = ([className, ids, d]) => drawn('path', { class: className, d, [St
 // Draws everything in the available pixels.
 function drawTime() {
 	const small = !isTopicTimeline && !beforePrint && ($.controls.classList.contains('small') || innerWidth <= 760), wide = $.axis.clientWidth, x = s => part(s) * wide;
-	rowHeight = small ? Math.max(2, Math.min(5, 48 / rows.length)) : ROW;
+	// Rows without events are folded if not all have space, since those with events tell the mission.
+	const most = small ? 5 : isTopicTimeline ? 56 : 14, least = small ? 2 : isTopicTimeline ? 20 : 9;
+	const room = beforePrint ? Infinity : small ? 48 : isTopicTimeline ? $.controls.clientHeight - $.buttons.offsetHeight - 110 : innerHeight * .3;
+	const isTight = !isTopicTimeline && rows.some(([i], r) => i >= 0 && !quiet[r]) && rows.filter(([i]) => i < 0 || !isOut(whole, i)).length * (small ? 3 : least) > room;
 	let count = 0;
+	isFolded = isTight && (small || !showsAll);
 	placeOf = rows.map((row, r) => isRowOut(row, r) ? -1 : count++);
+	folder.textContent = isFolded ? `${rows.filter((row, r) => quiet[r] && placeOf[r] < 0).length} more, without events` : 'Only rows with events';
+	folder.hidden = !isTight || small || !quiet.some(Boolean);
+	hasNames = !small;
+	rowHeight = Math.max(least, Math.min(most, Math.floor(room / (count + !folder.hidden))));
+	$.time.style.setProperty('--row', rowHeight + 'px');
 	rowNames.forEach((name, r) => { name.hidden = placeOf[r] < 0; });
 	const high = rowHeight * count, d = { lifetime: '', inferred: '', bar: '' }, signs = [];
 	rows.forEach(([, , , lifetimes, bars, events], r) => {
 		if (placeOf[r] < 0) return;
-		const y = (placeOf[r] + .5) * rowHeight, tall = rowHeight * .8;
+		const y = (placeOf[r] + .5) * rowHeight, tall = rowHeight * .8, sign = Math.min(tall, 13);
 		for (let k = 0; k < lifetimes.length; k += 3) {
 			const [from, to, isInferred] = lifetimes.slice(k, k + 3);
 			d[isInferred ? 'inferred' : 'lifetime'] += `M${x(from).toFixed(1)} ${y}H${x(to).toFixed(1)}`;
 		}
 		for (let k = 0; k < bars.length; k += 3) {
-			const h = rowHeight * (.16 + .06 * bars[k + 2]);
-			d.bar += rectangle(x(bars[k]), y - h / 2, Math.max(.6, x(bars[k + 1]) - x(bars[k])), h);
+			const h = rowHeight * (isTopicTimeline ? .1 * bars[k + 2] : .16 + .06 * bars[k + 2]);
+			d.bar += rectangle(x(bars[k]), isTopicTimeline ? y + tall / 2 - h : y - h / 2, Math.max(.6, x(bars[k + 1]) - x(bars[k])), h);
 		}
-		for (const [s, sign, id] of events) signs.push([['start', 'end', 'event'][sign], id, [
+		for (const [s, kind, id] of events) signs.push([['start', 'end', 'event'][kind], id, [
 			`M${x(s).toFixed(1)} ${y - tall / 2}v${tall}`,
-			`M${(x(s) - tall / 3).toFixed(1)} ${y - tall / 3}l${tall / 1.5} ${tall / 1.5}m0 ${-tall / 1.5}l${-tall / 1.5} ${tall / 1.5}`,
-			`M${(x(s) - tall / 4).toFixed(1)} ${y}l${tall / 4} ${-tall / 4}l${tall / 4} ${tall / 4}l${-tall / 4} ${tall / 4}z`][sign]]);
+			`M${(x(s) - sign / 3).toFixed(1)} ${y - sign / 3}l${sign / 1.5} ${sign / 1.5}m0 ${-sign / 1.5}l${-sign / 1.5} ${sign / 1.5}`,
+			`M${(x(s) - sign / 4).toFixed(1)} ${y}l${sign / 4} ${-sign / 4}l${sign / 4} ${sign / 4}l${-sign / 4} ${sign / 4}z`][kind]]);
 	});
 	for (const [s, a, b, id] of takeovers) {
 		if (placeOf[a] < 0 || placeOf[b] < 0) continue;
 		const [from, to] = [a, b].map(r => (placeOf[r] + .5) * rowHeight), tip = Math.sign(to - from) * 4;
 		signs.push(['takeover', id, `M${x(s)} ${from}V${to}m-3 ${-tip}l3 ${tip}l3 ${-tip}M${x(s) - 2} ${from}a2 2 0 1 0 4 0a2 2 0 1 0 -4 0`]);
 	}
-	set($.plot, { width: wide, height: high });
+	set($.plot, { width: wide, height: high + (folder.hidden ? 0 : rowHeight) });
 	for (const key in d) $.plot.querySelector('.' + key).setAttribute('d', d[key]);
 	$.plot.querySelector('.events').replaceChildren(...signs.map(markOf));
 	if (!data.sides) drawMarks(x);
@@ -110,7 +122,10 @@ function drawHead() {
 }
 function drawRow() {
 	const r = rows.findIndex(([i]) => i >= 0 && i == sel), rect = $.plot.firstElementChild;
-	rowNames.forEach((name, k) => name.classList.toggle('picked', k == r));
+	rowNames.forEach((name, k) => {
+		name.classList.toggle('picked', k == r);
+		name.classList.toggle('ring', hitList.includes(rows[k][0]));
+	});
 	set(rect, { x: 0, y: placeOf[r] * rowHeight || 0, width: r < 0 ? 0 : $.axis.clientWidth, height: rowHeight });
 }
 onSeek.push(drawHead);
@@ -125,7 +140,7 @@ function markAt(e) {
 	for (const [w, , , lines] of reported) for (const [time] of lines) if (Math.abs(time - s) < least) { least = Math.abs(time - s); best = w; }
 	return best;
 }
-const rowAt = e => rowHeight < ROW ? -1 : rows[placeOf.indexOf(Math.floor((e.clientY - $.plot.getBoundingClientRect().top) / rowHeight))]?.[0] ?? -1;
+const rowAt = e => !hasNames ? -1 : rows[placeOf.indexOf(Math.floor((e.clientY - $.plot.getBoundingClientRect().top) / rowHeight))]?.[0] ?? -1;
 let moved = 0, grip = 0, pressed = 0, first = -1;
 $.axis.onpointerdown = e => {
 	if (e.target.closest('#band button') || e.button) return;
@@ -139,7 +154,8 @@ $.axis.onpointerdown = e => {
 	pressed = s;
 	first = inside && e.pointerType != 'touch' ? -1 : windowAt(s);
 	anchor = -1;
-	if (!inside || range || w >= 0) go(w < 0 ? windowAt(s) : w);
+	if (w >= 0) visit(w);
+	else if (!inside || range) go(windowAt(s));
 };
 $.axis.onpointermove = e => {
 	if (e.buttons && $.axis.hasPointerCapture(e.pointerId)) {
@@ -158,7 +174,7 @@ $.axis.onpointermove = e => {
 		return hover(e, [rangeTimes(), n > 1 ? n + ' whole windows' : 'one whole window']);
 	}
 	const i = e.target.closest('#lifelines') ? rowAt(e) : -1, w = e.target.closest('#marks') ? markAt(e) : -1;
-	if (i >= 0) hover(e, explain(whole, i, [windowAt(timeAt(e)), windowAt(timeAt(e))]));
+	if (i >= 0) hover(e, explain(whole, i, [windowAt(timeAt(e)), windowAt(timeAt(e))]).slice(0, 2));
 	else if (w >= 0) hover(e, [`${clock(starts[w])} – ${clock(ends[w])}`, ...headlines.get(w).lines.slice(0, 8).map(line => line[3])]);
 	else $.tip.hidden = true;
 };

@@ -2,7 +2,8 @@
 // small to read is hidden.
 const isTopicTimeline = document.body.classList.contains('topic-timeline');
 let X = 0, Y = 0, S = 1, idle;
-const READABLE = 9, MOST = 6, pointers = new Map();
+// A little more than 9 pixels, since the size of the stage is rounded.
+const READABLE = 9.05, MOST = 6, pointers = new Map();
 for (const g of [whole, folded]) if (g?.svg) g.home = g.svg.getAttribute('viewBox').split(' ').map(Number);
 const svg = () => shown.svg ?? $.graph;
 const homeOf = () => shown.home ?? (shown.home = $.graph.getAttribute('viewBox').split(' ').map(Number));
@@ -25,7 +26,9 @@ function fit(box) {
 	const k = scaleOf(view), list = svg().classList;
 	list.toggle('norates', k < RATE * .999);
 	list.toggle('notopics', k < TOPIC * .999);
-	list.toggle('nonodes', k < NODE * .6);
+	list.toggle('nonodes', k < NODE * .5);
+	svg().style.setProperty('--name', Math.max(sizes[2], READABLE / k) + 'px');
+	svg().style.setProperty('--drop', Math.max(0, READABLE / k - sizes[2]) * .35 + 'px');
 	svg().style.setProperty('--space', Math.min(Math.max(sizes[3], 10 / k), 60) + 'px');
 	minimap();
 }
@@ -44,6 +47,7 @@ function zoom(by, dx = 0, dy = 0, x = wide / 2, y = high / 2) {
 function settle() {
 	const k = scaleOf(view), [left, top, w, h] = visible();
 	svg().style.willChange = svg().style.transform = '';
+	viewBefore = null;
 	fit([left - X / S / k, top - Y / S / k, w / S, h / S]);
 	X = Y = 0;
 	S = 1;
@@ -82,7 +86,16 @@ function firstView() {
 	if (scaleOf(homeOf()) >= TOPIC || document.body.classList.contains('bare')) return fit(homeOf());
 	const all = marked();
 	const some = all.length ? all : [...shown.names.keys()].filter(i => shown.isThere(i, now));
-	bring(some, scaleOf(around(boxesOf(some))) >= RATE ? RATE : TOPIC);
+	bring(some, TOPIC, TOPIC);
+}
+// Brings the changes into view if less than half of them is visible: at the present scale if they fit, else at the
+// smallest one at which they are legible.
+function look() {
+	const all = marked(), items = all.filter(i => i < shown.N), [x, y, w, h] = visible();
+	const boxes = boxesOf(items.length ? items : all), seen = boxes.filter(([a, b, c, d]) => a + c / 2 > x && a + c / 2 < x + w && b + d / 2 > y && b + d / 2 < y + h);
+	// Of a connection both ends.
+	if (seen.length < boxes.length / (items.length ? 2 : 1)) bring(all, TOPIC, Math.max(TOPIC, scaleOf(view)));
+	else if (!$.mini.hasAttribute('hidden')) outOfTheWay();
 }
 
 // The minimap: the whole graph, with a frame around the visible part.
@@ -103,14 +116,14 @@ function minimap() {
 	set(frame, { x, y, width, height });
 	outOfTheWay();
 }
-// The minimap is in the first corner in which it covers no selected element; if there is none, it fades.
+// The minimap is in the corner in which it covers the fewest changed and selected elements; if it covers any, it fades.
 function outOfTheWay() {
 	const k = scaleOf(view), { width: w, height: h } = $.mini.getBoundingClientRect(), edge = 14, [left, top] = visible();
-	const boxes = itemBoxes(near).map(b => [(b[0] - left) * k, (b[1] - top) * k, b[2] * k, b[3] * k]);
-	const isFree = ([x, y]) => !boxes.some(b => b[0] < x + w + edge && b[0] + b[2] > x - edge && b[1] < y + h + edge && b[1] + b[3] > y - edge);
-	const corners = [['', wide - w, high - h], ['west', 0, high - h], ['north', wide - w, 0], ['north west', 0, 0]];
-	const free = corners.find(([, x, y]) => isFree([x, y]));
-	$.mini.setAttribute('class', free ? free[0] : 'faint');
+	const boxes = itemBoxes([...near, ...marked()]).map(b => [(b[0] - left) * k, (b[1] - top) * k, b[2] * k, b[3] * k]);
+	const covered = (x, y) => boxes.filter(b => b[0] < x + w + edge && b[0] + b[2] > x - edge && b[1] < y + h + edge && b[1] + b[3] > y - edge).length;
+	const corners = [['', wide - w, high - h], ['west', 0, high - h], ['north', wide - w, 0], ['north west', 0, 0]].map(([name, x, y]) => [name, covered(x, y)]);
+	const [name, many] = corners.reduce((best, next) => next[1] < best[1] ? next : best);
+	$.mini.setAttribute('class', name + (many ? ' faint' : ''));
 }
 const markMini = () => $.mini.children[1].setAttribute('d', outline(itemBoxes(marked())));
 onSeek.push(() => $.mini.hasAttribute('hidden') || markMini());

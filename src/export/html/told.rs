@@ -1,0 +1,198 @@
+//! The changes as the page tells them, read from the event log: per window for the script, and as a table for readers without
+//! scripts, for printing, and for links into the mission.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::{HtmlPage, PageGraph};
+use crate::base::time::Stamp;
+use crate::base::words::{self, visible};
+use crate::draw::paint::xml::Xml;
+use crate::draw::picture::change_counts;
+use crate::draw::picture::title::SIDES;
+use crate::draw::timeline::Timeline;
+use crate::draw::timeline::marks::RowMark;
+use crate::graph::Element;
+use crate::mission::EventId;
+use crate::mission::event_log::{Event, Kind, LogFormat, LogLine, LogRow, row_lines};
+use crate::view::{Frame, Headline, Lasting};
+
+/// The headlines of a window, and the elements that are back in it: its index, the number of headlines, the texts of the
+/// three badges, its lines, and the film's headline.
+#[derive(Serialize)]
+pub(super) struct ToldWindow(usize, usize, [String; 3], Vec<ToldLine>, String);
+
+/// A change: its time in seconds, its sign (0 appeared, 1 vanished, 2 changed), its element (-1 for one that is not drawn),
+/// its sentence, its index in the log, and its time in words.
+#[derive(Serialize)]
+struct ToldLine(f64, u8, i64, String, EventId, String);
+
+/// The most headlines of one window that are listed; the rest is counted.
+const MOST_REPORTED: usize = 200;
+/// The most rows of the table; the rest is counted.
+const MOST_ROWS: usize = 200;
+/// The most phrases of a window's headline; the rest is counted.
+const MOST_PHRASES: usize = 5;
+
+/// The origin of times in seconds.
+#[derive(Clone, Copy)]
+pub(super) struct PageClock(pub(super) Stamp);
+
+impl PageClock {
+    /// The seconds from the origin to `at`, rounded down to milliseconds, as everywhere.
+    pub(super) fn secs(self, at: Stamp) -> f64 {
+        at.since(self.0).div_euclid(1_000_000) as f64 / 1e3
+    }
+}
+
+/// The element that represents each node, topic and edge.
+fn places(drawn: &PageGraph<'_>) -> BTreeMap<Element, u32> {
+    let mut places = BTreeMap::new();
+    let items = drawn.view.items.iter().map(|item| &item.members);
+    let arrows = drawn.order.iter().map(|id| &drawn.view.arrows[*id].members);
+    for (members, place) in items.chain(arrows).zip(0..) {
+        for member in members {
+            places.entry(*member).or_insert(place);
+        }
+    }
+    places
+}
+
+/// What a page tells of the event log.
+pub(super) struct Told {
+    /// The windows with changes.
+    pub(super) windows: Vec<ToldWindow>,
+    /// The element that represents each node, topic and edge.
+    pub(super) places: BTreeMap<Element, u32>,
+    pub(super) clock: PageClock,
+    /// The lifelines of the mission, if there are any.
+    pub(super) lives: Option<Timeline>,
+}
+
+impl Told {
+    pub(super) fn new(page: &HtmlPage<'_>) -> Self {
+        let (mission, whole) = (page.sequence.mission, &page.whole);
+        let view = whole.view;
+        let places = places(whole);
+        let clock = PageClock(view.frames.first().map_or(Stamp(0), |f| f.span.start));
+        let events = mission.log.events.with_ids();
+        let events: Vec<_> = events.filter(|(_, event)| event.is_headline()).collect();
+        let rows = events.iter().map(|(id, event)| LogRow::Event(*id, event));
+        let rows: Vec<LogRow<'_>> = rows.collect();
+        let written = row_lines(mission, &rows, LogFormat::Text);
+        let said = events
+            .iter()
+            .zip(&written)
+            .map(|((id, event), line)| (*id, (*event, line)));
+        let said: BTreeMap<EventId, (&Event, &LogLine)> = said.collect();
+        let place = |what: &Element| places.get(what).map_or(-1, |at| i64::from(*at));
+        // Two missions have no common time.
+        let secs =
+            |frame: &Frame, at| clock.secs(if view.compares { frame.span.start } else { at });
+        let back = |frame: &Frame, last: &Lasting| {
+            let (end, away) = (last.ended?, last.ended?.since(last.since));
+            let (node, topic) = mission.elements.names(last.what);
+            let name = visible(node.or(topic).unwrap_or_default());
+            let text = format!("{name} is back after {}", words::duration(away));
+            let when = words::offset_tenths(mission.offset(end));
+            let at = secs(frame, end);
+            Some(ToldLine(at, 2, place(&last.what), text, last.event, when))
+        };
+        let line = |frame: &Frame, headline: &Headline| {
+            let (event, line) = said.get(&headline.event)?;
+            let sign = match event.kind {
+                Kind::Started | Kind::Appeared => 0,
+                Kind::Stopped | Kind::Vanished => 1,
+                _ => 2,
+            };
+            // The list is sorted by the best estimate of each time, so that it has no ranges.
+            let when = match line.lead().trim() {
+                range if range.contains('–') => {
+                    format!("~{}", words::offset_seconds(mission.offset(event.time)))
+                }
+                exact => exact.to_owned(),
+            };
+            let (at, place) = (secs(frame, event.time), place(&headline.what));
+            let (text, id) = (line.words.clone(), headline.event);
+            Some(ToldLine(at, sign, place, text, id, when))
+        };
+        let frames = view.frames.iter().enumerate();
+        let frames = frames.filter(|(_, frame)| frame.is_changed());
+        let windows = frames.map(|(at, frame)| {
+            let mut counts = change_counts(&frame.counts).map(|(text, _)| text);
+            let returns = frame.lasting.iter().filter_map(|last| back(frame, last));
+            let returns: Vec<ToldLine> = returns.collect();
+            if frame.headlines.is_empty() {
+                counts[2] = format!("{} back", returns.len());
+            }
+            let headlines = frame.headlines.iter().take(MOST_REPORTED);
+            let headlines = headlines.filter_map(|headline| line(frame, headline));
+            ToldWindow(
+                at,
+                frame.counts.total(),
+                counts,
+                headlines.chain(returns).collect(),
+                visible(&frame.words(MOST_PHRASES)).into_owned(),
+            )
+        });
+        let windows: Vec<ToldWindow> = windows.collect();
+        // The list has every mark: a part of an event is marked only if the event is told in the same window.
+        let whole = |id| mission.log.events.get(id).and_then(|event| event.part_of);
+        let is_told = |mark: &RowMark, id: EventId| {
+            let (id, at) = (whole(id).unwrap_or(id), mark.at);
+            let mut own = windows
+                .iter()
+                .filter(|w| view.frames[w.0].span.contains(at));
+            view.compares || own.any(|window| window.3.iter().any(|line| line.4 == id))
+        };
+        let mut lives = page.sequence.unfolded.and_then(|u| u.lives).cloned();
+        for row in lives.iter_mut().flat_map(|lives| &mut lives.rows) {
+            let is_marked = |mark: &RowMark| mark.events.iter().any(|id| is_told(mark, *id));
+            row.marks.retain(is_marked);
+        }
+        Self {
+            windows,
+            places,
+            clock,
+            lives,
+        }
+    }
+
+    /// A row per change: its time as a link, and its sentence; empty without changes.
+    pub(super) fn table(&self, compares: bool) -> String {
+        let lines = self
+            .windows
+            .iter()
+            .flat_map(|w| w.3.iter().map(|line| (w.0, line)));
+        let mut lines: Vec<(usize, &ToldLine)> = lines.collect();
+        // Windows may overlap.
+        lines.sort_by(|(_, a), (_, b)| a.0.total_cmp(&b.0).then(a.4.cmp(&b.4)));
+        lines.dedup_by(|(_, a), (_, b)| (a.0, a.4) == (b.0, b.4));
+        let mut xml = Xml::default();
+        if lines.is_empty() {
+            return String::new();
+        }
+        xml.open("details").attribute("open", "");
+        xml.leaf(
+            "summary",
+            ["All changes", "Differences"][usize::from(compares)],
+        );
+        if lines.len() > MOST_ROWS {
+            let text = format!("The first {MOST_ROWS} of {}:", lines.len());
+            xml.leaf("p", &text);
+        }
+        xml.open("table")
+            .open("tbody")
+            .attribute("id", "allchanges");
+        for (window, ToldLine(at, _, _, text, event, when)) in lines.into_iter().take(MOST_ROWS) {
+            let when = if compares { SIDES[window.min(1)] } else { when };
+            xml.open("tr").attribute("data-entry", event).open("th");
+            xml.open("a").attribute("href", format_args!("#t={at}"));
+            xml.text(when).close().close();
+            xml.leaf("td", text).close().raw("\n");
+        }
+        xml.close().close().close();
+        xml.finish()
+    }
+}
