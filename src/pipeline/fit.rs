@@ -139,7 +139,9 @@ impl Fitting<'_> {
             own.alike_in = phases.collect();
         });
         self.show_if(true, |own| own.are_leaves_in_words = true);
-        self.show_if(self.options().is_bundled, |own| own.are_unlinked_in_words = true);
+        self.show_if(self.options().is_bundled, |own| {
+            own.are_unlinked_in_words = true
+        });
         let spared = self.collapse_the_steady();
         self.collapse_the_rest(spared);
         if self.is_readable() {
