@@ -65,7 +65,10 @@ fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
     // Whether a node is known only from the messages of a topic.
     let is_only_sender = |node: NodeId, topic| {
         let mut words = context.elements.nodes[node].seen.evidence.words();
-        words.all(|word| word == "connection") && sent[node].iter().all(|other| *other == topic)
+        let mut others = sent[node].iter().filter(|other| **other != topic);
+        // Every node publishes `/rosout`.
+        words.all(|word| ["connection", "rosout_rule"].contains(&word))
+            && others.all(|other| context.is_by_the_way(*other))
     };
     for hand in headlines(drafts, &[Kind::HandedOver]) {
         let event = drafts.get(hand).clone();
