@@ -115,7 +115,8 @@ pub(crate) fn collect(
     for (node, restarts) in restarts.with_ids() {
         for restart in restarts {
             let liveness = liveness_of.entry(ElementKey::Node(node)).or_default();
-            liveness.signs.extend([restart.death, restart.birth]);
+            let seen = restart.is_timed().then_some(restart.death);
+            liveness.signs.extend(seen.into_iter().chain([restart.birth]));
             liveness.ends.push(restart.death);
         }
     }
