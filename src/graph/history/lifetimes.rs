@@ -568,6 +568,10 @@ impl Liveness {
             if let Some(ended) = life.ended.as_mut().filter(|e| e.time == restart.death) {
                 let latest = restart.death.plus(period.max(SHUTDOWN_NS));
                 ended.latest = latest.min(restart.birth);
+                // The time of the restart is that of the start.
+                if !restart.is_timed() {
+                    ended.earliest = restart.death;
+                }
             }
             if let Some(began) = life.began.as_mut().filter(|b| b.time == restart.birth) {
                 let earliest = restart.birth.plus(-DISCOVERY_NS - period);

@@ -116,7 +116,9 @@ pub(crate) fn collect(
         for restart in restarts {
             let liveness = liveness_of.entry(ElementKey::Node(node)).or_default();
             let seen = restart.is_timed().then_some(restart.death);
-            liveness.signs.extend(seen.into_iter().chain([restart.birth]));
+            liveness
+                .signs
+                .extend(seen.into_iter().chain([restart.birth]));
             liveness.ends.push(restart.death);
         }
     }

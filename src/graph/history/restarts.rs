@@ -376,7 +376,11 @@ fn between_records(
 fn declared(said: &Few<Name, Vec<&Inference>>) -> Restarts {
     let mut all = Restarts::default();
     for (node, of) in said.with_ids() {
-        let first = of.iter().flat_map(|one| signs_of(one)).min();
+        // The start in an anonymous name is that of the process.
+        let own = of
+            .iter()
+            .filter(|one| source_word(one.source) != "anonymous");
+        let first = own.flat_map(|one| signs_of(one)).min();
         let starts = of.iter().filter_map(|one| match &one.when {
             Validity::Begins { signs, .. } if source_word(one.source) == "parameter_events" => {
                 Some(signs)
