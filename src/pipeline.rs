@@ -8,6 +8,7 @@ use crate::base::words::worded;
 mod collect;
 #[cfg(feature = "render")]
 mod compose;
+mod copies;
 #[cfg(feature = "render")]
 mod drawing;
 #[cfg(feature = "render")]

@@ -13,7 +13,7 @@ use bagreel::{Reading, read};
 
 use crate::support::rosbag1::{Pack, write};
 use crate::support::snapshot::assert_snapshot;
-use crate::support::{Publisher, Recording};
+use crate::support::{ORIGIN, Publisher, Recording};
 
 const SECOND: i64 = 1_000_000_000;
 
@@ -90,6 +90,26 @@ impl Healthy {
             moved.is_some()
         });
         copy
+    }
+
+    /// The recording of another robot, with other contents, this much later.
+    fn another(&self, later: i64) -> Recording {
+        let mut copy = self.copy(|_, at| Some(at + later));
+        for (publisher, _, payload) in &mut copy.messages {
+            let topic = &self.all.publishers[*publisher].topic;
+            let is_read = ["/rosout", "/rosout_agg", "/statistics"].contains(&topic.as_str());
+            if let Some(last) = payload.last_mut().filter(|_| !is_read) {
+                *last ^= 1;
+            }
+        }
+        copy
+    }
+
+    /// The recording with a copy of it behind, as a script writes them into one file.
+    fn appended(&self, time: impl FnMut(&str, i64) -> Option<i64>) -> Recording {
+        let mut all = self.all.clone();
+        all.messages.extend(self.copy(time).messages);
+        all
     }
 
     /// Whether a topic belongs to the first half of all of them.
@@ -235,8 +255,19 @@ fn clock_faults_are_attributed_to_the_recorder() {
             "two robots with the same names",
             vec![
                 healthy.copy(|_, at| Some(at)),
+                healthy.another(5_012_345_678),
+            ],
+        ),
+        (
+            "two recorders of one robot, one 5 s ahead",
+            vec![
+                healthy.copy(|_, at| Some(at)),
                 healthy.copy(|_, at| Some(at + 5_012_345_678)),
             ],
+        ),
+        (
+            "one recording appended to another",
+            vec![healthy.appended(|topic, at| second(at + 3_000_000, topic))],
         ),
         (
             "half of the topics each",
@@ -287,7 +318,7 @@ fn two_robots_with_the_same_names_are_distinguished_by_a_namespace() {
     let alone = mission(&[healthy.copy(|_, at| Some(at))], |_, _| {});
     let both = [
         healthy.copy(|_, at| Some(at)),
-        healthy.copy(|_, at| Some(at + 5_012_345_678)),
+        healthy.another(5_012_345_678),
     ];
     let both = mission(&both, |reading, paths| {
         reading
@@ -312,7 +343,7 @@ fn two_robots_with_the_same_names_are_distinguished_by_a_namespace() {
         );
     }
     let says = |text: &str| both.notices.iter().any(|n| n.text.contains(text));
-    assert!(says("ahead of") && !says("restarts are unknown"));
+    assert!(!says("restarts are unknown"));
 }
 
 #[test]
@@ -323,17 +354,80 @@ fn the_offset_of_a_clock_is_estimated_from_common_messages() {
         healthy.copy(|topic, at| (topic != "/robot2/scan").then_some(at)),
         healthy.copy(late),
     ];
-    let notes = |offset: i64| -> Vec<String> {
+    let notes = |offset: Option<i64>| -> Vec<String> {
         let mission = mission(&recordings, |reading, paths| {
-            reading.offsets.push((paths[1].clone(), offset));
+            let offset = offset.map(|offset| (paths[1].clone(), offset));
+            reading.offsets.extend(offset);
         });
         let notes = mission.notices.iter().map(|n| n.text.clone());
         notes.filter(|text| text.contains("the clock of")).collect()
     };
-    let found = notes(0);
+    // A wrong offset is not corrected, but the note contains the whole one.
+    for offset in [0, -100_000_000] {
+        let found = notes(Some(offset));
+        assert!(
+            found.len() == 1 && found[0].contains("1.bag=-0.350s` corrects it"),
+            "{found:?}"
+        );
+    }
+    assert_eq!(notes(Some(-350_000_000)), [] as [&str; 0]);
+    let found = notes(None);
     assert!(
-        found.len() == 1 && found[0].contains("1.bag=-0.350s"),
+        found.len() == 1 && found[0].contains("corrected; `--offset 1.bag=0s`"),
         "{found:?}"
     );
-    assert_eq!(notes(-350_000_000), [] as [&str; 0]);
+}
+
+#[test]
+fn what_two_recorders_recorded_counts_once() {
+    let recorder = |late: i64, ends: i64| {
+        let mut bag = Recording::default();
+        let pose = bag.publisher("/localizer", "/pose", "geometry_msgs/PoseStamped");
+        bag.publishers[pose].definition =
+            "Header header\n====\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
+                .to_owned();
+        let own = bag.publisher(
+            "/driver",
+            ["/scan", "/odom"][usize::from(late > 0)],
+            "std_msgs/Empty",
+        );
+        for at in 0..ends * 10 {
+            let sent = ORIGIN + at * SECOND / 10;
+            let stamp = [sent / SECOND, sent % SECOND].map(|part| u32::try_from(part).unwrap());
+            let payload = [
+                &0_u32.to_le_bytes()[..],
+                &stamp.map(u32::to_le_bytes).concat(),
+                &[0; 60],
+            ];
+            bag.messages.push((pose, sent + late, payload.concat()));
+            bag.messages.push((own, sent + late, Vec::new()));
+        }
+        bag
+    };
+    // No payload is read but a few to compare them: there are no log records.
+    let mission = mission(&[recorder(0, 60), recorder(4_000_000, 30)], |_, _| {});
+    let pose = mission
+        .elements
+        .topics
+        .iter()
+        .position(|t| t.name.as_str() == "/pose")
+        .unwrap();
+    let sender = mission
+        .sending
+        .senders
+        .iter()
+        .find(|s| s.topic.0 as usize == pose);
+    let counts: Vec<u64> = sender.unwrap().stretches.iter().map(|s| s.count).collect();
+    assert_eq!(counts, [600]);
+    let says = |text: &str| mission.notices.iter().any(|n| n.text.contains(text));
+    assert!(
+        says("left out 300 messages of `1.bag`, recorded twice") && !says("restarts are unknown")
+    );
+    // `/driver` sends `/odom` in the recording that ends sooner.
+    let stopped = mission
+        .log
+        .events
+        .iter()
+        .filter(|e| e.kind == Kind::Stopped);
+    assert_eq!(stopped.count(), 0);
 }

@@ -145,7 +145,7 @@ fn log2(logger: &str, text: &str, file: &str) -> Vec<u8> {
 }
 
 /// `rcl_interfaces/msg/ParameterEvent` with new parameters, all of them Boolean.
-fn parameters(node: &str, set: &[(&str, bool)]) -> Vec<u8> {
+pub(crate) fn parameters(node: &str, set: &[(&str, bool)]) -> Vec<u8> {
     let mut event = Cdr::default().time(SECOND).text(node);
     event = event.u32(u32::try_from(set.len()).unwrap());
     for (name, value) in set {

@@ -6,10 +6,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use crate::causes::{at, minute, shown};
+use crate::edges::parameters;
 use crate::gate::bagreel;
 use crate::pairs::loaded;
+use crate::support::mission::definition;
 use crate::support::rosbag1::{Pack, write};
-use crate::support::{ORIGIN, Recording, shared};
+use crate::support::{ORIGIN, Recording, mcap, shared};
 
 const MILLISECOND: i64 = 1_000_000;
 
@@ -58,6 +60,32 @@ fn a_node_that_restarts_between_two_parts_of_a_recording_is_found() {
     let found = restarts(&[whole], Stdio::null());
     assert_eq!(found.len(), 3, "{found:?}");
     assert_eq!(restarts(&parts, Stdio::null()), found);
+}
+
+#[test]
+fn a_node_that_declares_its_parameters_again_has_restarted() {
+    let mut bag = Recording::default();
+    let kind = "rcl_interfaces/msg/ParameterEvent";
+    let events = bag.publisher("", "/parameter_events", kind);
+    let odom = bag.publisher("", "/odom", "std_msgs/msg/Empty");
+    bag.publishers[events].definition = definition(kind);
+    bag.send(odom, (0, 100_000), 100, &[0, 1, 0, 0]);
+    // The second declaration is of the same start.
+    for at in [10_000, 11_500, 60_000] {
+        let start = parameters("/nav", &[("use_sim_time", false)]);
+        bag.messages
+            .push((events, ORIGIN + at * MILLISECOND, start));
+    }
+    bag.messages.sort_by_key(|message| message.1);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let options = mcap::Options {
+        profile: "ros2",
+        ..mcap::Options::default()
+    };
+    fs::write(&path, mcap::write(&bag, &options)).unwrap();
+    let found = restarts(&[path], Stdio::null());
+    assert_eq!(found, ["00:59.9  /nav restarted"]);
 }
 
 #[test]

@@ -100,6 +100,20 @@ fn the_feedback_of_an_action_is_no_rhythm() {
 }
 
 #[test]
+fn a_node_that_only_stands_in_for_another_waits_before_and_after() {
+    let mut bag = Recording::default();
+    let usual = bag.publisher("/controller", "/command", "std_msgs/Empty");
+    let other = bag.publisher("/servo", "/command", "std_msgs/Empty");
+    bag.send(usual, (0, 20_000), 100, &[]);
+    bag.send(other, (20_300, 40_000), 100, &[]);
+    bag.send(usual, (40_300, 60_000), 100, &[]);
+    let text = sorted(bag);
+    assert!(text.contains("/controller → /servo"), "{text}");
+    let others = ["started", "stopped", "silent"];
+    assert!(!others.iter().any(|word| text.contains(word)), "{text}");
+}
+
+#[test]
 fn a_pause_of_the_recorder_does_not_hide_an_end() {
     let mut bag = Recording::default();
     for (node, end) in [

@@ -68,6 +68,10 @@ pub(crate) const FIRST_RECORD: u32 = 1;
 /// connects within a second, and misses a few.
 pub(crate) const BEGUN_AGAIN: u32 = 5;
 
+/// The time after its first sign within which a node of ROS 2 declares its parameters; a declaration later than that is another
+/// start. Of the public recordings, 73 contain parameter events, and none a node that declares them again.
+pub(crate) const DECLARED_NS: i64 = 2 * SECOND;
+
 // ---- The recorder.
 
 /// The time in which a recorder has found the topics that exist when it starts; their messages come a period later at

@@ -1,5 +1,5 @@
 //! The clocks of recorders: credible times, as a few messages far from all others were recorded with a clock that was not set;
-//! and the differences between several recorders.
+//! and the messages that several recorders have in common, which show by how much their clocks differ.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -10,7 +10,7 @@ use crate::base::rhythm::GAP_NS;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::inference::Stream;
 use crate::evidence::observation::Observations;
-use crate::evidence::times::Calendar;
+use crate::evidence::times::{Calendar, SeriesId};
 
 pub(crate) const DAY: i64 = 86_400_000_000_000;
 /// The distance in days beyond which times count as far from all others: no mission has a pause of a year.
@@ -156,20 +156,22 @@ fn stated(clusters: &[DayCluster]) -> String {
     )
 }
 
-// Differences between the clocks of several recorders, by the messages that two of them recorded.
+// Messages that two recorders have in common: how far their clocks are apart, and whether they recorded one robot. For example, 900 of
+// 1,000 messages of `/odom` in one bag are in another, each 2.50 s later: the second recorder's clock is 2.50 s ahead. Their stamps are
+// equal, too, so that no second robot can have sent them.
 
 /// The fewest common messages that are significant: a few short ones may be equal by chance, and ten take a second at 10 Hz.
 const FEWEST: usize = 10;
-/// The fewest topics that must agree: a node may send the same sequence again.
+/// The fewest topics that must agree, unless their messages carry stamps: a node may send the same sequence again.
 const TOPICS: usize = 2;
 /// The share, in per cent, of the messages in common that must agree about the offset; the others were delayed on their way. With a
 /// half, two recordings of one robot whose messages repeat would have an offset.
 const SHARE: usize = 80;
 /// The largest difference between the offsets of two messages, in nanoseconds: they take different paths to
 /// the recorders, over a network within some ten milliseconds. Smaller offsets than this do not change a window.
-const NEAR_NS: i64 = 50_000_000;
+pub(crate) const NEAR_NS: i64 = 50_000_000;
 
-/// The offset of a recorder's clock.
+/// The messages that two recordings have in common, and the offset of a recorder's clock.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ClockOffset {
     /// The index of the bag among the inputs, and that of the one that it is compared with.
@@ -179,12 +181,22 @@ pub(crate) struct ClockOffset {
     pub(crate) ahead: i64,
     /// The number of messages that show it.
     pub(crate) messages: usize,
+    /// Whether both recorded one robot: in wall time, with stamps or on several topics. In simulated time, two runs may have equal
+    /// messages at equal times.
+    pub(crate) is_one_robot: bool,
 }
 
-/// The times of contents that occur once on a topic of a bag; `None` for those that occur more often.
-type Contents<'a> = BTreeMap<(&'a str, u32), Option<Stamp>>;
+impl ClockOffset {
+    /// Whether the clocks differ.
+    pub(crate) fn is_apart(&self) -> bool {
+        self.ahead.abs() > NEAR_NS
+    }
+}
 
-/// The bags whose clocks differ from that of an earlier one.
+/// The times of contents that occur once on a topic of a bag, and whether they carry stamps; `None` for those that occur more often.
+type Contents<'a> = BTreeMap<(&'a str, u32), Option<(Stamp, bool)>>;
+
+/// The pairs of bags that have messages in common, each bag with those before it.
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
@@ -200,47 +212,96 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
             continue;
         }
         let contents = &mut bags[stream.bag];
+        let stamped = facts.ages.some(at).is_some();
         facts.times.merge(&[*series], |timed| {
             let key = (stream.connection.topic.as_str(), timed.size);
-            let time = contents.entry(key).or_insert(Some(timed.time));
-            *time = time.filter(|time| *time == timed.time);
+            let time = contents.entry(key).or_insert(Some((timed.time, stamped)));
+            *time = time.filter(|(time, _)| *time == timed.time);
         })?;
     }
     let filled = (0..bags.len()).filter(|bag| !bags[*bag].is_empty());
     let filled: Vec<usize> = filled.collect();
     let mut found = Vec::new();
     for (at, bag) in filled.iter().copied().enumerate() {
-        let mut before = filled[..at].iter().copied();
-        let found_offset =
-            before.find_map(|other| Some((other, offset(&bags[other], &bags[bag])?)));
-        if let Some((other, (ahead, messages))) = found_offset
-            && ahead.abs() > NEAR_NS
-        {
-            found.push(ClockOffset {
+        let before = filled[..at].iter().copied();
+        found.extend(before.filter_map(|other| {
+            let (ahead, messages, is_one_robot) = offset(&bags[other], &bags[bag])?;
+            Some(ClockOffset {
                 bag,
                 other,
                 ahead,
                 messages,
-            });
-        }
+                is_one_robot,
+            })
+        }));
     }
     Ok(found)
 }
 
-/// The delay of the common messages in the second recording, and their number; `None` without agreement.
-fn offset(one: &Contents<'_>, other: &Contents<'_>) -> Option<(i64, usize)> {
+/// Whether a later part of a bag, between two times, repeats messages of the part before: at least half of what `is_again` says to be in both.
+///
+/// # Errors
+/// If the temporary file of times cannot be read.
+pub(crate) fn repeats(
+    (streams, facts): (&[Stream], &Observations),
+    span: Span,
+    is_again: impl Fn(&Stream) -> bool,
+) -> io::Result<bool> {
+    let mut series: BTreeMap<_, Vec<SeriesId>> = BTreeMap::new();
+    for (at, own) in facts.payloads.somes() {
+        let stream = &streams[at];
+        if !stream.latched && is_again(stream) {
+            let key = (stream.topic, stream.publisher);
+            series.entry(key).or_default().push(*own);
+        }
+    }
+    let (mut all, mut copies) = (0, 0);
+    for own in series.values() {
+        let mut contents = Vec::new();
+        facts.times.merge(own, |timed| {
+            contents.extend(
+                span.contains(timed.time)
+                    .then_some((timed.size, timed.time)),
+            );
+        })?;
+        contents.sort_unstable();
+        // What occurs more often is a constant.
+        let single = contents
+            .chunk_by(|a, b| a.0 == b.0)
+            .filter(|same| same.len() <= 2);
+        for same in single {
+            let is_near = same
+                .last()
+                .is_some_and(|last| last.1.since(same[0].1) <= NEAR_NS);
+            all += same.len();
+            copies += usize::from(is_near && same.len() == 2);
+        }
+    }
+    let is_set = span.start.0 > UNSET_DAYS * DAY;
+    Ok(is_set && copies >= FEWEST && copies * 4 >= all)
+}
+
+/// The delay of the common messages in the second recording, their number, and whether both recorded one robot; `None` without
+/// agreement.
+fn offset(one: &Contents<'_>, other: &Contents<'_>) -> Option<(i64, usize, bool)> {
     let both = other.iter().filter_map(|(key, time)| {
-        let before = one.get(key)?.as_ref()?;
-        Some((time.as_ref()?.since(*before), key.0))
+        let (before, stamped) = (*one.get(key)?)?;
+        Some(((*time)?.0.since(before), key.0, stamped))
     });
-    let mut lags: Vec<(i64, &str)> = both.collect();
+    let mut lags: Vec<(i64, &str, bool)> = both.collect();
     lags.sort_unstable();
     let median = lags.get(lags.len() / 2)?.0;
     let near = lags.iter().filter(|lag| (lag.0 - median).abs() <= NEAR_NS);
     let agreeing = near.clone().count();
+    let is_stamped = near.clone().filter(|lag| lag.2).count() >= FEWEST;
     let topics: BTreeSet<&str> = near.map(|lag| lag.1).collect();
+    let is_set = other
+        .values()
+        .flatten()
+        .all(|(time, _)| time.0 > UNSET_DAYS * DAY);
+    let is_one_robot = is_set && (is_stamped || topics.len() > TOPICS);
     let is_clear = agreeing >= FEWEST && agreeing * 100 >= lags.len() * SHARE;
-    (is_clear && topics.len() >= TOPICS).then_some((median, agreeing))
+    (is_clear && (is_stamped || topics.len() >= TOPICS)).then_some((median, agreeing, is_one_robot))
 }
 
 #[cfg(test)]
@@ -355,7 +416,7 @@ mod tests {
 
         fn contents(times: &[i64]) -> Contents<'static> {
             let keys = (0..).map(|hash| (["/tf", "/odom"][hash as usize % 2], hash));
-            keys.zip(times.iter().map(|t| Some(Stamp(t * 1_000_000))))
+            keys.zip(times.iter().map(|t| Some((Stamp(t * 1_000_000), false))))
                 .collect()
         }
 
@@ -363,7 +424,7 @@ mod tests {
         fn an_offset_needs_messages_that_agree() {
             let one: Vec<i64> = (0..20).map(|n| n * 100).collect();
             let later: Vec<i64> = one.iter().map(|t| t + 350 + t % 7).collect();
-            let (ahead, messages) = offset(&contents(&one), &contents(&later)).unwrap();
+            let (ahead, messages, _) = offset(&contents(&one), &contents(&later)).unwrap();
             assert_eq!((ahead / 10_000_000, messages), (35, 20));
             let wild: Vec<i64> = one.iter().map(|t| t * 2).collect();
             assert_eq!(offset(&contents(&one), &contents(&wild)), None);
@@ -373,6 +434,14 @@ mod tests {
                 all
             };
             assert_eq!(offset(&only(contents(&one)), &only(contents(&later))), None);
+            let stamped = |times| -> Contents<'static> {
+                let all = only(contents(times)).into_iter();
+                all.map(|(key, time)| (key, time.map(|(time, _)| (time, true))))
+                    .collect()
+            };
+            let found = offset(&stamped(&one), &stamped(&later)).unwrap();
+            // In simulated time, which may be another run.
+            assert_eq!((found.1, found.2), (10, false));
         }
     }
 }

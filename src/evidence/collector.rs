@@ -506,6 +506,7 @@ impl Recorded {
                 other,
                 ahead: first.since(*start),
                 messages: 0,
+                is_one_robot: false,
             })
         };
         self.offsets.extend(belief.others.iter().filter_map(offset));

@@ -533,8 +533,9 @@ impl Conclusions<'_> {
             if signs.is_empty() && matches!(fact.observation, Observation::Joins(..)) {
                 continue;
             }
-            // If every record has the first number, sequence numbers are unused.
+            // If every log record has the first number, sequence numbers are unused.
             if let Observation::Begins(node) = fact.observation
+                && source_word(fact.source) == "rosout"
                 && signs.len() > 1
                 && records.get(&(fact.source, node)) == Some(&(signs.len() as u64))
             {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::copies::{self, Copies, Rest};
 use super::inputs::{check_named, each_once, in_time, space_of};
 use super::{Reading, Watch};
 use crate::bag::straight::{self, ClockFall, Straightened, Watched};
@@ -10,20 +11,50 @@ use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::Span;
 use crate::base::words;
-use crate::evidence::clock::{self, ClockOffset};
+use crate::evidence::clock;
 use crate::evidence::collector::{self, Collector, Recorded};
 use crate::graph::window;
 
 /// The bags of a mission, read.
 pub(super) struct Collected {
+    /// The bags, in the order of their indices.
+    pub(super) inputs: Vec<Input>,
     pub(super) reports: Vec<Report>,
     pub(super) recorded: Recorded,
     /// The time range that is divided into windows.
     pub(super) range: Span,
 }
 
-/// Reads every bag once; with `verify` by the second, independent reader.
-pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) -> Result<Collected> {
+/// Reads every bag once, and again if several recorded one robot; with `verify` by the second, independent reader. Adds the offsets
+/// of clocks that it finds to the reading.
+pub(super) fn collect(
+    reading: &mut Reading,
+    verify: bool,
+    watch: &mut dyn Watch,
+) -> Result<Collected> {
+    let mut all = once(reading, &Copies::default(), verify, watch)?;
+    let pairs = copies::pairs(reading, &all.inputs, &all.recorded)?;
+    let (shifts, mut notices) = copies::correct(reading, &pairs, &all.inputs);
+    let left_out = copies::copies(&all.recorded, &pairs, &shifts);
+    if !notices.is_empty() || !left_out.is_empty() {
+        all = once(reading, &left_out, verify, watch)?;
+    }
+    let offsets = &all.recorded.offsets;
+    for of_bag in offsets.chunk_by(|a, b| a.bag == b.bag) {
+        let first = of_bag.iter().find(|offset| offset.is_apart());
+        notices.extend(first.map(|offset| copies::apart(reading, offset, &all.inputs, false)));
+    }
+    all.recorded.notices.extend(notices);
+    Ok(all)
+}
+
+/// Reads every bag once, without messages that another one contains.
+fn once(
+    reading: &Reading,
+    copies: &Copies,
+    verify: bool,
+    watch: &mut dyn Watch,
+) -> Result<Collected> {
     let options = OpenOptions { verify };
     let (inputs, twice) = each_once(&reading.inputs)?;
     let whole: u64 = inputs.iter().filter_map(bag::size_on_disk).sum();
@@ -48,26 +79,38 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
     let mut reports = Vec::new();
     let mut seams = Vec::new();
     let (mut before, mut size) = (0, 0);
-    for (reader, space) in readers.iter_mut().zip(&spaces) {
+    let mut left_out = Vec::new();
+    for (bag, (reader, space)) in readers.iter_mut().zip(&spaces).enumerate() {
         let mut progress = |done, total: u64| {
             size = total;
             watch.progress(before + done, whole.max(before + total));
         };
         let mut sink = collector.bag_in(space, &mut progress);
-        let mut watched = Watched::new(&mut sink);
+        let mut rest = Rest::new(&mut sink, copies, bag);
+        let mut watched = Watched::new(&mut rest);
         reports.push(reader.read(range, &mut watched)?);
         seams.push(watched.seams());
+        left_out.push(rest.left_out);
         before += std::mem::take(&mut size);
     }
     let is_straight = seams.iter().all(Vec::is_empty);
     let is_pipe = inputs.iter().any(Input::is_pipe);
     if !is_straight && !is_pipe {
+        let first = collector.finish()?;
+        for (bag, seams) in seams.iter_mut().enumerate() {
+            for seam in seams {
+                copies::examine(reading, &inputs[bag], (&first, bag), seam)?;
+            }
+        }
         collector = Collector::new(affordable(reading));
         let all = readers.iter_mut().zip(&spaces).zip(&seams);
-        for ((reader, space), seams) in all {
+        for (bag, ((reader, space), seams)) in all.enumerate() {
             let mut progress = |done, total| watch.progress(done, total);
             let mut sink = collector.bag_in(space, &mut progress);
-            reader.read(range, &mut Straightened::new(seams, &mut sink))?;
+            let mut rest = Rest::new(&mut sink, copies, bag);
+            let mut straight = Straightened::new(seams, &mut rest);
+            reader.read(range, &mut straight)?;
+            left_out[bag] = straight.left_out + rest.left_out;
         }
     }
     let mut recorded = collector.finish()?;
@@ -83,9 +126,8 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
     }
     recorded.notices.extend(twice);
     recorded.notices.extend(gap(&recorded, &inputs));
-    let offsets = recorded.offsets.iter();
-    let apart = offsets.map(|offset| apart(offset, &inputs));
-    recorded.notices.extend(apart);
+    let left_out = left_out.iter().zip(&inputs).filter(|(many, _)| **many > 0);
+    recorded.notices.extend(left_out.map(twice_recorded));
     let falls = seams
         .iter()
         .flat_map(|seams| straight::falls(seams, !is_pipe));
@@ -107,6 +149,7 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
         return Err(no_messages(&reading.inputs, &recorded.notices));
     }
     Ok(Collected {
+        inputs,
         reports,
         recorded,
         range,
@@ -148,27 +191,10 @@ fn gap(recorded: &Recorded, inputs: &[Input]) -> Option<Notice> {
     Some(Notice::new(NoticeKind::Apart, text))
 }
 
-/// The notice about recorders whose clocks differ: by the messages that two of them recorded, or by all of them.
-fn apart(offset: &ClockOffset, inputs: &[Input]) -> Notice {
-    let [own, other] = [offset.bag, offset.other].map(|at| inputs[at].name());
-    let seconds = offset.ahead as f64 / 1e9;
-    let length = words::duration(offset.ahead.saturating_abs());
-    let side = if offset.ahead > 0 {
-        "ahead of"
-    } else {
-        "behind"
-    };
-    let (why, then) = match offset.messages {
-        0 => ("their first messages".to_owned(), "puts these together"),
-        many => (
-            words::count(many, "message") + " that both recorded",
-            "corrects it",
-        ),
-    };
-    let text = format!(
-        "the clock of `{own}` is {length} {side} that of `{other}` by {why}: `--offset {own}={:+.3}s` {then}",
-        -seconds
-    );
+/// The notice about messages of a bag that another one, or the same, contains before.
+fn twice_recorded((many, input): (&u64, &Input)) -> Notice {
+    let (many, name) = (words::count(*many, "message"), input.name());
+    let text = format!("left out {many} of `{name}`, recorded twice");
     Notice::new(NoticeKind::Note, text)
 }
 

@@ -132,6 +132,7 @@ impl Follow {
             _ => span.start.max(from),
         };
         let collected = Collected {
+            inputs: reading.inputs.clone(),
             reports: vec![self.report()],
             recorded,
             range: Span { start, ..span },

@@ -53,17 +53,17 @@ pub(super) fn in_time(
     input: &Input,
     reader: Box<dyn Reader>,
 ) -> Box<dyn Reader> {
-    let own = reading
-        .offsets
-        .iter()
-        .filter(|(name, _)| is_of(name, input));
-    match own
-        .map(|(_, by)| by)
-        .fold(0, |all: i64, by| all.saturating_add(*by))
-    {
-        0 => reader,
-        by => Box::new(Moved::new(reader, by)),
+    match given_offset(reading, input) {
+        None | Some(0) => reader,
+        Some(by) => Box::new(Moved::new(reader, by)),
     }
+}
+
+/// The time by which the clock of an input's recorder is corrected, in nanoseconds; `None` if it is not.
+pub(super) fn given_offset(reading: &Reading, input: &Input) -> Option<i64> {
+    let all = reading.offsets.iter();
+    let own = all.filter(|(name, _)| is_of(name, input));
+    own.map(|(_, by)| *by).reduce(i64::saturating_add)
 }
 
 /// The namespace for the names in an input; empty for none.

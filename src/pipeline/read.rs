@@ -137,7 +137,9 @@ pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Mission, Vec
         refuse(reading, path)?;
         return Ok((reread(path, reading)?, Vec::new()));
     }
-    let mut collected = collect(reading, false, watch)?;
+    let mut reading = reading.clone();
+    let mut collected = collect(&mut reading, false, watch)?;
+    let reading = &reading;
     let verified = reading.verify.then(|| verify(&collected, reading, watch));
     let verified = verified.transpose()?;
     watch.stage(Stage::Graphs);

@@ -27,7 +27,7 @@ pub(super) fn verify(
     watch: &mut dyn Watch,
 ) -> Result<Verified> {
     watch.stage(Stage::Verify);
-    let second = collect(reading, true, watch);
+    let second = collect(&mut reading.clone(), true, watch);
     match second.and_then(|second| compare(first, &second, reading)) {
         Err(Error::Interrupted) => Err(Error::Interrupted),
         Err(why) => Ok(Verified {

@@ -334,6 +334,8 @@ pub(crate) struct Pulse {
     /// The longest pause between two stretches, in nanoseconds; 0 for none.
     pause: i64,
     is_even: bool,
+    /// The end of its recording: another one may go on without it.
+    until: Stamp,
 }
 
 impl Pulse {
@@ -342,6 +344,7 @@ impl Pulse {
         stretches: &[Stretch],
         restarts: &[Restart],
         recorder: &[Span],
+        until: Stamp,
     ) -> Option<Self> {
         let last = stretches.last()?;
         let pauses = stretches.windows(2).map(|p| (p[0].last, p[1].first));
@@ -356,6 +359,7 @@ impl Pulse {
             period: last.period,
             pause: pauses.max().unwrap_or(0),
             is_even: last.is_even,
+            until,
         })
     }
 
@@ -366,7 +370,12 @@ impl Pulse {
 
     /// Whether the silence at the end is too long for the rhythm.
     pub(crate) fn broke_off(&self, end: Stamp) -> bool {
-        end.since(self.last) > self.patience()
+        self.silence(self.last, end) > self.patience()
+    }
+
+    /// The silence after a last sign, in nanoseconds, as far as it was recorded.
+    fn silence(&self, sign: Stamp, end: Stamp) -> i64 {
+        end.min(self.until).since(sign)
     }
 
     /// The longest insignificant silence, in nanoseconds.
@@ -559,6 +568,10 @@ impl Liveness {
             if let Some(ended) = life.ended.as_mut().filter(|e| e.time == restart.death) {
                 let latest = restart.death.plus(period.max(SHUTDOWN_NS));
                 ended.latest = latest.min(restart.birth);
+                // The time of the restart is that of the start.
+                if !restart.is_timed() {
+                    ended.earliest = restart.death;
+                }
             }
             if let Some(began) = life.began.as_mut().filter(|b| b.time == restart.birth) {
                 let earliest = restart.birth.plus(-DISCOVERY_NS - period);
@@ -609,13 +622,14 @@ impl Liveness {
             });
         }
         let last_sign = self.last_sign.filter(|_| !self.unending)?;
-        let silence = mission.since(last_sign);
         let broken = self.pulses().iter().filter(|p| {
             // A rhythm that ended long before the last sign does not explain the silence after it.
+            let silence = p.silence(last_sign, mission);
             let ends = last_sign.since(p.last) <= p.patience() && silence > p.patience();
             ends && (is_node || p.is_even)
         });
-        let is_sure = !is_node || silence > GONE_NS || broken.clone().count() > 1;
+        let is_long = |p: &Pulse| p.silence(last_sign, mission) > GONE_NS;
+        let is_sure = !is_node || broken.clone().any(is_long) || broken.clone().count() > 1;
         let fastest = broken.min_by_key(|p| p.period).filter(|_| is_sure)?;
         Some(Bound {
             time: last_sign,

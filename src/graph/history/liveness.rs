@@ -5,7 +5,7 @@ use std::io;
 
 use crate::base::ids::Few;
 use crate::base::name::{is_feedback, is_log, lies_in};
-use crate::base::rhythm::{CROWD_NS, FOUND_NS, broken_after};
+use crate::base::rhythm::{CROWD_NS, FOUND_NS, TOGETHER_NS, broken_after};
 use crate::base::role::{role, start};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::Recorded;
@@ -34,7 +34,8 @@ pub(crate) fn collect(
     let is_rewritten = streams.any(|stream| {
         stream.trust == Reliability::First && !is_log(stream.connection.topic.as_str())
     });
-    let forwarded = forwarded(findings, traffic);
+    let mut forwarded = forwarded(findings, traffic);
+    forwarded.extend(stand_ins(traffic).map(|what| (what, (true, true))));
     let asked = asked(findings, traffic);
     let inferences = std::mem::take(&mut findings.inferences);
     let findings = &*findings;
@@ -53,6 +54,10 @@ pub(crate) fn collect(
                 let Some(senders) = traffic.some(stream.topic) else {
                     continue;
                 };
+                // The messages of its sender may all be in another bag.
+                if senders.is_empty_among_others(*at) {
+                    continue;
+                }
                 let place = senders.place(*at).unwrap_or(0);
                 let with = node.and_then(|node| forwarded.get(&(node, stream.topic)));
                 let (with_start, with_end) = with.copied().unwrap_or_default();
@@ -110,7 +115,10 @@ pub(crate) fn collect(
     for (node, restarts) in restarts.with_ids() {
         for restart in restarts {
             let liveness = liveness_of.entry(ElementKey::Node(node)).or_default();
-            liveness.signs.extend([restart.death, restart.birth]);
+            let seen = restart.is_timed().then_some(restart.death);
+            liveness
+                .signs
+                .extend(seen.into_iter().chain([restart.birth]));
             liveness.ends.push(restart.death);
         }
     }
@@ -146,6 +154,28 @@ fn forwarded(findings: &Findings, traffic: &Traffic) -> BTreeMap<(Name, Name), (
         Some(((node, topic), (!began, !goes_on)))
     };
     findings.copies.iter().filter_map(ends).collect()
+}
+
+/// The publications, as node and topic, that only fill gaps of another publisher of their topic: their nodes may wait before and
+/// after. For example, `/arm/servo` sends `/arm/command` from 128 s to 142 s, while `/arm/controller` does not.
+fn stand_ins(traffic: &Traffic) -> impl Iterator<Item = (Name, Name)> + '_ {
+    let is_near = |a: Stamp, b: Stamp| a.since(b).abs() <= TOGETHER_NS;
+    traffic.somes().flat_map(move |(topic, of)| {
+        let named = || of.list.iter().filter(|s| s.node.is_some() && !s.latched);
+        let fills = move |own: &&Sender| {
+            let bounds = own.stretches.first().zip(own.stretches.last());
+            let mut others = named().filter(|other| other.node != own.node);
+            bounds.is_some_and(|(first, last)| {
+                others.any(|other| {
+                    other.gaps().any(|gap| is_near(gap.0, first.first))
+                        && other.gaps().any(|gap| is_near(gap.1, last.last))
+                })
+            })
+        };
+        named()
+            .filter(fills)
+            .filter_map(move |own| Some((own.node?, topic)))
+    })
 }
 
 /// When others sent the first message to each node, on a topic below its name: what it sends at once is the answer
@@ -257,7 +287,12 @@ fn follow(liveness: &mut Liveness, senders: &Senders, place: usize, what: &Follo
     let messages = liveness.messages();
     messages.reach(Some(sender.recording));
     messages.due = messages.due.max(Some(due));
-    let pulse = Pulse::of(&sender.stretches, what.restarts, what.pauses);
+    let pulse = Pulse::of(
+        &sender.stretches,
+        what.restarts,
+        what.pauses,
+        sender.recording.1,
+    );
     let pulse = pulse.filter(|_| what.beats && !latched);
     messages.pulses.extend(pulse);
 }
@@ -280,14 +315,14 @@ pub(crate) fn fall_silent(
             continue;
         };
         for (node, stretches) in by_publisher(nodes, sender, findings) {
-            let end = sender.recording.1.min(findings.mission.1);
             let Some(liveness) = liveness_of.get_mut(&ElementKey::Publish(node, topic)) else {
                 continue;
             };
             if begins_steadily(stretches) {
                 liveness.begins.push(stretches[0].first);
             }
-            let pulse = Pulse::of(stretches, &[], pauses).filter(|pulse| pulse.broke_off(end));
+            let pulse = Pulse::of(stretches, &[], pauses, sender.recording.1);
+            let pulse = pulse.filter(|pulse| pulse.broke_off(findings.mission.1));
             if let Some(pulse) = pulse {
                 liveness.signs.push(pulse.last());
                 liveness.last_sign = liveness.last_sign.max(Some(pulse.last()));

@@ -8,21 +8,30 @@ use std::io;
 use crate::base::error::Result;
 use crate::base::ids::Few;
 use crate::base::name::is_log;
-use crate::base::rhythm::{FEWEST, GAP, GAP_NS};
+use crate::base::rhythm::{DECLARED_NS, FEWEST, GAP, GAP_NS};
 use crate::base::time::Stamp;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
 use crate::evidence::inference::{Inference, Reliability, Validity};
 use crate::evidence::numbers::Number;
 use crate::evidence::observation::Name;
+use crate::evidence::source_word;
 use crate::graph::history::Stretch;
 use crate::graph::history::senders::{Sender, Traffic};
 
-/// A restart of a node: its last sign before, its first one after.
+/// A restart of a node: its last sign before, its first one after. If it is not known how long it was away, one is just before the
+/// other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Restart {
     pub(crate) death: Stamp,
     pub(crate) birth: Stamp,
+}
+
+impl Restart {
+    /// Whether it is known when the node was last there.
+    pub(crate) fn is_timed(&self) -> bool {
+        self.birth.since(self.death) > 1
+    }
 }
 
 /// Restarts by node, sorted by time.
@@ -226,7 +235,7 @@ pub(crate) fn restarts(
         }
     }
     let said = said(&findings.inferences);
-    let mut all = Restarts::default();
+    let mut all = declared(&said);
     for (node, own) in nodes.with_ids() {
         let is_copy = |fall: &&Fall| {
             let mut alike = alike.get(&fall.header()).into_iter().flatten();
@@ -361,6 +370,35 @@ fn between_records(
         falls.map(|(from, to)| ((*from, *at), (*to, *at)))
     });
     next.into_iter().chain(inside)
+}
+
+/// The starts that nodes of ROS 2 declare after other signs of them, by the source of parameter events.
+fn declared(said: &Few<Name, Vec<&Inference>>) -> Restarts {
+    let mut all = Restarts::default();
+    for (node, of) in said.with_ids() {
+        // The start in an anonymous name is that of the process.
+        let own = of
+            .iter()
+            .filter(|one| source_word(one.source) != "anonymous");
+        let first = own.flat_map(|one| signs_of(one)).min();
+        let starts = of.iter().filter_map(|one| match &one.when {
+            Validity::Begins { signs, .. } if source_word(one.source) == "parameter_events" => {
+                Some(signs)
+            }
+            _ => None,
+        });
+        let mut starts: Vec<Stamp> = starts.flatten().copied().collect();
+        starts.sort_unstable();
+        let mut before = first.copied().unwrap_or(Stamp::MAX);
+        for birth in starts {
+            if birth.since(before) > DECLARED_NS {
+                let death = birth.plus(-1);
+                all.grown(node).push(Restart { death, birth });
+            }
+            before = birth;
+        }
+    }
+    all
 }
 
 /// All statements about each node.

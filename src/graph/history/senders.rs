@@ -37,6 +37,16 @@ impl Senders {
     pub(crate) fn place(&self, stream: usize) -> Option<usize> {
         self.streams.binary_search(&stream).ok()
     }
+
+    /// Whether a stream has no messages while others of its sender have.
+    pub(crate) fn is_empty_among_others(&self, stream: usize) -> bool {
+        let Some(place) = self.place(stream) else {
+            return false;
+        };
+        let mut all = self.of.iter().zip(&self.traces);
+        let has_messages = all.any(|(of, trace)| *of == self.of[place] && trace.is_some());
+        self.traces[place].is_none() && has_messages
+    }
 }
 
 /// The messages of one sender on one topic, over all its streams: a split recording has one per part.

@@ -44,18 +44,20 @@ fn by<K: Ord>(
     of
 }
 
-/// The node that an event is about, if that started or stopped.
+/// The node that an event is about, if that started, stopped or fell silent.
 fn limit(event: &Event) -> Option<(NodeId, Kind)> {
     match (event.what, event.kind) {
-        (Element::Node(node), Kind::Started | Kind::Stopped) => Some((node, event.kind)),
+        (Element::Node(node), Kind::Started | Kind::Stopped | Kind::Silent) => {
+            Some((node, event.kind))
+        }
         _ => None,
     }
 }
 
-/// A node that is known only from one topic's messages need not have stopped or started when another node
+/// A node that is known only from one topic's messages need not have stopped or started, and falls silent, when another node
 /// takes that topic over: if `/joystick` is known from `/cmd_vel` alone and `/nav` takes it over, `/joystick` is still there.
 fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
-    let limits = headlines(drafts, &[Kind::Started, Kind::Stopped]);
+    let limits = headlines(drafts, &[Kind::Started, Kind::Stopped, Kind::Silent]);
     let limits = by(drafts, limits, limit);
     let steps = by(drafts, headlines(drafts, &[Kind::Rate]), |event| {
         let (node, topic) = context.elements.ends(event.what);
@@ -65,7 +67,10 @@ fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
     // Whether a node is known only from the messages of a topic.
     let is_only_sender = |node: NodeId, topic| {
         let mut words = context.elements.nodes[node].seen.evidence.words();
-        words.all(|word| word == "connection") && sent[node].iter().all(|other| *other == topic)
+        let mut others = sent[node].iter().filter(|other| **other != topic);
+        // Every node publishes `/rosout`.
+        words.all(|word| ["connection", "rosout_rule"].contains(&word))
+            && others.all(|other| context.is_by_the_way(*other))
     };
     for hand in headlines(drafts, &[Kind::HandedOver]) {
         let event = drafts.get(hand).clone();
@@ -84,6 +89,7 @@ fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
         }
         let ends = [
             (from, Kind::Stopped, event.earliest),
+            (from, Kind::Silent, event.earliest),
             (to, Kind::Started, event.time),
         ];
         for (nodes, kind, at) in ends {

@@ -29,9 +29,9 @@ pub(crate) fn sentence_with(mission: &Mission, parts: &[EventId], event: &Event)
 /// The sentence without the name of the element: `30 → 5 Hz`, `restarted, away for 6.8 s`.
 pub(crate) fn predicate(mission: &Mission, parts: &[EventId], event: &Event) -> String {
     let elements = &mission.elements;
-    let lasted = event
-        .until
-        .map(|until| words::duration(until.since(event.time).max(0)));
+    // A node that is away for a nanosecond restarted at an unknown time before.
+    let until = event.until.filter(|until| until.since(event.time) > 1);
+    let lasted = until.map(|until| words::duration(until.since(event.time)));
     match (&event.detail, event.kind) {
         (Detail::Rates { from_hz, to_hz }, _) => {
             let change = words::rate_change(*from_hz, *to_hz);
@@ -78,7 +78,7 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EventId], event: &Event) -> 
         }
         (Detail::None, Kind::Restarted) => match lasted {
             Some(lasted) => format!("restarted, away for {lasted}{}", too(mission, parts, event)),
-            None => "restarted".to_owned(),
+            None => format!("restarted{}", too(mission, parts, event)),
         },
         (Detail::None, Kind::Silent) => {
             let lasted = lasted.map_or_else(|| "to the end".to_owned(), |t| format!("for {t}"));
