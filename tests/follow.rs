@@ -177,7 +177,8 @@ fn a_signal_ends_following_and_writes_the_outputs() {
     }
     let done = follower.wait_with_output().unwrap();
     assert_eq!(done.status.code(), Some(0));
-    assert!(String::from_utf8_lossy(&done.stdout).contains("/joystick started"));
+    let said = String::from_utf8_lossy(&done.stdout);
+    assert!(said.contains("/planner → /joystick"), "{said}");
     assert!(folder.path().join("f.json").is_file());
 }
 
@@ -260,7 +261,8 @@ fn the_newest_recording_of_a_folder_is_followed() {
     sleep(Duration::from_millis(20));
     fs::write(folder.path().join("new.bag"), bag).unwrap();
     let done = output(folder.path(), &["follow", "."]);
-    assert!(String::from_utf8_lossy(&done.stdout).contains("/joystick started"));
+    let said = String::from_utf8_lossy(&done.stdout);
+    assert!(said.contains("/planner → /joystick"), "{said}");
     let empty = TempDir::new().unwrap();
     assert_ne!(
         output(empty.path(), &["follow", "."]).status.code(),

@@ -328,9 +328,6 @@ fn quality(
 /// The share of the smallest useful scale below which all drawings are equally useless: a sketch has no useful scale.
 const MOST_USELESS: f64 = 4.0;
 
-/// A scale at which a part fits the page well, relative to the smallest of any use: other parts need space too.
-const LEGIBLE: f64 = 1.25;
-
 /// The use of a drawing at this scale, 1 unless it is too small: it is then worse than its size alone says.
 fn use_of(fit: f64, options: &LayoutOptions) -> f64 {
     let useless = (options.least / fit).clamp(1.0, MOST_USELESS);
@@ -395,11 +392,7 @@ fn best_block(
     let others = inside.into_iter().chain(wraps).map(judged);
     let best = others.fold(best, better);
     // Layers show the way of the data best; blocks are for what does not fit the page in layers.
-    let needed = match options.least {
-        least if least > 0.0 => least * LEGIBLE,
-        _ => 1.0,
-    };
-    if needed.is_infinite() || pack::fit(best.1.size, options.page) >= needed {
+    if options.least.is_infinite() || pack::fit(best.1.size, options.page) >= 1.0 {
         return best.1;
     }
     let judge = |block: &PlacedPart| {

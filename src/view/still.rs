@@ -16,7 +16,7 @@ use crate::base::words;
 use crate::graph::history::Sender;
 use crate::graph::{ById, Element};
 use crate::mission::event_log::Kind;
-use crate::mission::rates::{Rates, mean};
+use crate::mission::rates::{Rates, mean, same};
 use crate::mission::{EventId, Mission};
 
 /// The times at which a box of a still was there.
@@ -100,13 +100,16 @@ pub(crate) fn union(view: &View) -> Option<SeenWindow> {
 struct StillRates<'a>(Rates<'a>);
 
 impl StillRates<'_> {
-    /// The mean rate of some senders together while they send, and the rates in order if there are several.
-    fn rate(&self, senders: &[&Sender]) -> Option<(f64, Vec<f64>)> {
+    /// The mean rate of some senders together while they send, and the rates in order if there are several. `hz`, the mean
+    /// of the windows, stays if it is the same.
+    fn rate(&self, senders: &[&Sender], hz: Option<f64>) -> Option<(f64, Vec<f64>)> {
         let pieces = self.0.of(senders);
         let mut steps: Vec<f64> = pieces.iter().map(|piece| piece.hz).collect();
         steps.dedup_by(|a, b| words::rate(*a) == words::rate(*b));
         steps.truncate(if steps.len() > 1 { steps.len() } else { 0 });
-        Some((mean(&pieces)?, steps))
+        let mean = mean(&pieces)?;
+        let hz = hz.filter(|hz| same(*hz, mean)).unwrap_or(mean);
+        Some((hz, steps))
     }
 
     /// The look of a box or row of a single topic, with its rates.
@@ -115,7 +118,7 @@ impl StillRates<'_> {
             return shown;
         };
         let senders: Vec<&Sender> = self.0.of_topic(*topic);
-        match self.rate(&senders) {
+        match self.rate(&senders, shown.hz) {
             Some((hz, steps)) => Shown {
                 hz: Some(hz),
                 steps,
@@ -132,14 +135,14 @@ impl StillRates<'_> {
             let edges = self
                 .0
                 .publications(&arrow.members, name.map(|name| &**name));
-            if let Some((hz, steps)) = self.rate(&self.0.senders(&edges)) {
+            if let Some((hz, steps)) = self.rate(&self.0.senders(&edges), row.hz) {
                 (row.hz, row.steps) = (Some(hz), steps);
             }
         }
         if arrow.kind == ArrowKind::Publish {
             let edges = self.0.publications(&arrow.members, None);
             if let [_] = edges[..]
-                && let Some((hz, steps)) = self.rate(&self.0.senders(&edges))
+                && let Some((hz, steps)) = self.rate(&self.0.senders(&edges), shown.hz)
             {
                 (shown.hz, shown.steps) = (Some(hz), steps);
             }

@@ -301,10 +301,7 @@ mod tests {
 
     #[test]
     fn nodes_and_topics_are_written_like_in_rqt_graph() {
-        let file = file(
-            &["/ns/a>/t@12.5 /b</t /a>/tf /ns/c"],
-            &ViewOptions::default(),
-        );
+        let file = file(&["/ns/a>/t@12 /b</t /a>/tf /ns/c"], &ViewOptions::default());
         assert!(line(&file, "n___b [").contains(r#"label="/b", shape=ellipse, pos=""#));
         assert!(line(&file, "n___b [").contains(r#"tooltip="/b", URL="__b""#));
         assert!(line(&file, "t___t [").contains(r#"label="/t", shape=box, pos=""#));
@@ -313,7 +310,7 @@ mod tests {
         assert!(line(&file, "subgraph cluster___ns {").contains(r#"graph [bb=""#));
         let edge = line(&file, "n___ns__a -> t___t [");
         assert!(
-            edge.contains(r#"penwidth=3, style=solid, label="12.5 Hz", lp=""#),
+            edge.contains(r#"penwidth=3, style=solid, label="12 Hz", lp=""#),
             "{edge}"
         );
         assert!(!file.contains("colorR") && !file.contains("edge ["));
