@@ -78,9 +78,12 @@ const MOST_RATES: usize = 4;
 pub fn rates(all_hz: &[f64]) -> String {
     let split: Vec<(String, &str)> = all_hz.iter().map(|hz| split_rate(*hz)).collect();
     let unit = split.last().map_or("", |last| last.1);
-    let one = |(value, own): &(String, &str)| match *own == unit {
-        true => value.clone(),
-        false => format!("{value} {own}"),
+    let one = |(value, own): &(String, &str)| {
+        if *own == unit {
+            value.clone()
+        } else {
+            format!("{value} {own}")
+        }
     };
     let mut parts: Vec<String> = split.iter().map(one).collect();
     if parts.len() > MOST_RATES {

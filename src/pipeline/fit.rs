@@ -140,7 +140,7 @@ impl Fitting<'_> {
         });
         self.show_if(true, |own| own.are_leaves_in_words = true);
         self.show_if(self.options().is_bundled, |own| {
-            own.are_unlinked_in_words = true
+            own.are_unlinked_in_words = true;
         });
         let spared = self.collapse_the_steady();
         self.collapse_the_rest(spared);

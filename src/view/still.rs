@@ -33,9 +33,12 @@ pub(super) fn still(mut view: View, mission: &Mission) -> View {
     let lengths = Lengths::new(view.frames.iter().map(|f| f.span));
     let rates = StillRates(Rates::new(mission));
     for row in &mut view.rows {
-        let shown = whole(&row.shown, &lengths).map(|shown| match row.is_infrastructure {
-            true => shown,
-            false => rates.of_topics(&row.item.members, shown),
+        let shown = whole(&row.shown, &lengths).map(|shown| {
+            if row.is_infrastructure {
+                shown
+            } else {
+                rates.of_topics(&row.item.members, shown)
+            }
         });
         row.shown = Looks::of([shown.as_ref()]);
     }

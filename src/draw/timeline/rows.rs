@@ -184,14 +184,14 @@ fn row(
 
 /// The topics of some publications that tell something about their nodes, the fastest first.
 fn sent_by<'s>(source: &'s FigureSource<'_>, rates: &Rates<'_>, edges: &[EdgeId]) -> Vec<&'s str> {
-    let rated = |edge: &EdgeId| {
+    let sent = |edge: &EdgeId| {
         let topic = source.mission.elements.publishes.get(*edge)?.topic;
         let hz = mean(&rates.of(&rates.senders(&[*edge])));
         (!source.is_hub(topic)).then_some((hz.unwrap_or(0.0), source.topic(topic)))
     };
-    let mut rated: Vec<(f64, &str)> = edges.iter().filter_map(rated).collect();
-    rated.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));
-    rated.into_iter().map(|(_, name)| name).collect()
+    let mut all: Vec<(f64, &str)> = edges.iter().filter_map(sent).collect();
+    all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));
+    all.into_iter().map(|(_, name)| name).collect()
 }
 
 /// The names of topics as a node of this name sees them, each once, an arrow before the first.

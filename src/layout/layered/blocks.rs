@@ -127,8 +127,8 @@ impl<'a> Blocks<'a> {
         let draft = Draft::new(&outer, self.options)?;
         let (_, layout) = draft.assembled(&outer, self.options, self.orientation);
         let mut placed = PlacedPart::unplaced(part);
-        let (places, free) = layout.boxes.split_at(frames.len());
-        for (at, place) in places.iter().enumerate() {
+        let (spaces, free) = layout.boxes.split_at(frames.len());
+        for (at, place) in spaces.iter().enumerate() {
             let by = Point::new(place.x - frames[at].x, place.y - frames[at].y);
             chosen[at].0.put(&chosen[at].1, by, &mut placed);
             placed.clusters[cut.spaces[at] - 1] = *place;
