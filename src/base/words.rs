@@ -63,12 +63,7 @@ pub fn rate(hz: f64) -> String {
 
 /// A rate that changed: `15 → 7.4 Hz`, `900 Hz → 1.2 kHz`.
 pub fn rate_change(from_hz: f64, to_hz: f64) -> String {
-    let ((from, from_unit), (to, unit)) = (split_rate(from_hz), split_rate(to_hz));
-    if from_unit == unit {
-        format!("{from} → {to} {unit}")
-    } else {
-        format!("{from} {from_unit} → {to} {unit}")
-    }
+    rates(&[from_hz, to_hz])
 }
 
 /// The most rates in a row of them.

@@ -3,10 +3,10 @@
 //! `player/` contains the handwritten parts of the page: its template, its style sheet, and its script in parts, which are
 //! joined in order. [`data`] defines the data for the script.
 
+mod changes;
 mod data;
 mod element_runs;
 mod signs;
-mod told;
 
 use std::fmt::Write as _;
 
@@ -29,8 +29,8 @@ use crate::export::target::Target;
 use crate::graph::Id as _;
 use crate::mission::info::info;
 use crate::view::{ArrowId, ItemId, View};
+use changes::PageChanges;
 use element_runs::ViewRuns;
-use told::Told;
 
 const PAGE: &str = include_str!("html/player/page.html");
 const LOOK: &str = include_str!("html/player/page.css");
@@ -137,11 +137,11 @@ impl HtmlPage<'_> {
     /// The page: UTF-8, without any requests; its policy allows its scripts and styles by digest.
     pub(crate) fn write(&self) -> String {
         let still = self.whole.view.busiest_change();
-        let told = Told::new(self);
+        let changes = PageChanges::new(self);
         let fonts = fonts();
         let look = self.look();
         let script = SCRIPT.map(squeezed).join("\n");
-        let (data, data_type) = data::packed(&data::json(self, still, &told));
+        let (data, data_type) = data::packed(&data::json(self, still, &changes));
         let policy = format!(
             "default-src 'none';script-src {};style-src {} {};font-src data:;img-src data:;base-uri 'none';form-action 'none'",
             digest::policy(&script),
@@ -168,7 +168,7 @@ impl HtmlPage<'_> {
         };
         let title = escaped(&visible(self.title));
         let sentence = info(self.sequence.mission).summary;
-        let begin = words::date(told.clock.0.0).unwrap_or_default();
+        let begin = words::date(changes.clock.0.0).unwrap_or_default();
         fill(PAGE, |key| match key {
             "policy" => policy.clone(),
             "schemes" => schemes.to_owned(),
@@ -182,8 +182,8 @@ impl HtmlPage<'_> {
             "where" => self.place(still),
             "date" => begin.clone(),
             "last" => view.frames.len().saturating_sub(1).to_string(),
-            "changes" => told.table(view.compares),
-            "legend" => self.legend(told.lives.as_ref()),
+            "changes" => changes.table(view.compares),
+            "legend" => self.legend(changes.lives.as_ref()),
             "notes" => self.notes(),
             "data_type" => data_type.to_owned(),
             "data" => data.clone(),

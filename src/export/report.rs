@@ -16,8 +16,8 @@ use crate::export::sequence::Sequence;
 use crate::export::target::Target;
 use crate::graph::{Element, Existence, Graphs};
 use crate::mission::Mission;
-use crate::mission::info::summary::{Most, told};
-use crate::mission::info::{how_many, info};
+use crate::mission::info::summary::{Most, described};
+use crate::mission::info::{Info, how_many, info};
 use crate::view::{Frame, View};
 
 /// The most bytes of each part; together they stay below 256 KiB, a quarter of the limit of a job summary.
@@ -41,7 +41,8 @@ pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<
 fn report(sequence: &Sequence<'_>) -> String {
     let mission = sequence.mission;
     let view = sequence.unfolded.map_or(sequence.view, |all| all.view);
-    let mut out = verdict(sequence, view) + "\n\n";
+    let info = info(mission);
+    let mut out = verdict(sequence, view, &info) + "\n\n";
     let links = sequence.options.links.iter();
     let links: Vec<String> = links
         .map(|(name, url)| format!("[{}](<{}>)", plain(name), address(url)))
@@ -65,7 +66,7 @@ fn report(sequence: &Sequence<'_>) -> String {
     out.push_str(&chart::chart(view));
     out.push_str(&nodes(mission, view));
     out.push_str(&topics(mission, view));
-    out.push_str(&evidence(mission));
+    out.push_str(&evidence(mission, &info));
     out.push_str(&notices(sequence.notices));
     out
 }
@@ -91,7 +92,7 @@ impl ReportTimes<'_> {
 }
 
 /// The first lines: the mission as one sentence, and how it is divided.
-fn verdict(sequence: &Sequence<'_>, view: &View) -> String {
+fn verdict(sequence: &Sequence<'_>, view: &View, info: &Info) -> String {
     let title = title(sequence);
     let Some(first) = view.frames.first() else {
         return format!("**{}**: no windows.", plain(&title));
@@ -105,7 +106,7 @@ fn verdict(sequence: &Sequence<'_>, view: &View) -> String {
     format!(
         "**{}**: {}.\n\n{}{} of {lengths}{}.",
         plain(&title),
-        plain(&info(sequence.mission).summary),
+        plain(&info.summary),
         date.map_or_else(String::new, |date| format!("From {date}, in ")),
         words::count(view.frames.len(), "window"),
         of_them.unwrap_or_default(),
@@ -151,7 +152,7 @@ fn folded_table(summary: &str, heads: &[&str], rows: Vec<String>, most: usize) -
 }
 
 /// All kinds of changes of a window; the rest of a kind is counted.
-const MOST_TOLD: Most = Most {
+const EACH_KIND: Most = Most {
     kinds: usize::MAX,
     elements: 12,
 };
@@ -192,7 +193,7 @@ fn changes(mission: &Mission, view: &View, times: &ReportTimes<'_>) -> String {
 fn changes_of(mission: &Mission, frame: &Frame) -> String {
     let events = frame.headlines.iter().map(|headline| headline.event);
     let events = events.filter_map(|id| Some((id, mission.log.events.get(id)?)));
-    plain(&told(mission, &events.collect::<Vec<_>>(), MOST_TOLD))
+    plain(&described(mission, &events.collect::<Vec<_>>(), EACH_KIND))
 }
 
 /// The number of windows that contain an element, with its messages and the sum of its rates in them.
@@ -300,8 +301,7 @@ fn topics(mission: &Mission, view: &View) -> String {
 }
 
 /// The strength of the evidence for the graph, as sentences, and the bags.
-fn evidence(mission: &Mission) -> String {
-    let info = info(mission);
+fn evidence(mission: &Mission, info: &Info) -> String {
     let parts = [
         ("node", info.nodes_by_degree),
         ("publication", info.publishes_by_degree),

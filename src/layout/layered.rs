@@ -346,13 +346,11 @@ fn best_block(
     orientation: Orientation,
 ) -> PlacedPart {
     let links = part.links.len();
-    let quality = |size: Size, crossings: u64, length: f64| {
-        quality(size, (crossings, length), links, options)
-    };
-    let judged = |block: PlacedPart| {
+    let judge = |block: &PlacedPart| {
         let length = block.routes.iter().map(Route::length).sum();
-        (quality(block.size, block.crossings, length), block)
+        quality(block.size, (block.crossings, length), links, options)
     };
+    let judged = |block: PlacedPart| (judge(&block), block);
     let better = |best: (f64, PlacedPart), next: (f64, PlacedPart)| {
         if next.0 > best.0 { next } else { best }
     };
@@ -395,10 +393,6 @@ fn best_block(
     if options.least.is_infinite() || pack::fit(best.1.size, options.page) >= 1.0 {
         return best.1;
     }
-    let judge = |block: &PlacedPart| {
-        let length = block.routes.iter().map(Route::length).sum();
-        quality(block.size, block.crossings, length)
-    };
     let blocks = blocks::best(plan, options, part, orientation, judge);
     blocks.into_iter().fold(best, better).1
 }

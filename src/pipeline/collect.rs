@@ -1,7 +1,5 @@
 //! Reads every bag once and gathers its evidence.
 
-use std::collections::BTreeMap;
-
 use super::copies::{self, Copies, Rest};
 use super::inputs::{check_named, each_once, in_time, space_of};
 use super::{Reading, Watch};
@@ -158,21 +156,15 @@ fn once(
 
 /// The notice about the longest time between two recordings, if it is longer than all of them together: they are several runs.
 fn gap(recorded: &Recorded, inputs: &[Input]) -> Option<Notice> {
-    let mut spans: BTreeMap<usize, Span> = BTreeMap::new();
-    for stream in &recorded.streams {
-        if let Some((first, last)) = recorded.messages.bounds(stream.times) {
-            let own = Span::new(first, last);
-            let all = spans.entry(stream.bag).or_insert(own);
-            *all = all.hull(own);
-        }
-    }
-    let whole: i64 = spans.values().map(Span::nanos).sum();
-    let mut spans: Vec<(usize, Span)> = spans.into_iter().collect();
+    // Each ends a nanosecond after its last message.
+    let spans = copies::spans(recorded);
+    let whole: i64 = spans.somes().map(|(_, span)| span.nanos() - 1).sum();
+    let mut spans: Vec<(usize, Span)> = spans.somes().map(|(bag, span)| (bag, *span)).collect();
     spans.sort_by_key(|(_, span)| span.start);
     let mut before = *spans.first()?;
     let mut longest: Option<(i64, usize, usize)> = None;
     for (bag, span) in spans {
-        let gap = span.start.since(before.1.end);
+        let gap = span.start.since(before.1.end) + 1;
         if gap > whole && longest.is_none_or(|(other, ..)| gap > other) {
             longest = Some((gap, before.0, bag));
         }

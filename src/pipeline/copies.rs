@@ -83,7 +83,7 @@ pub(super) fn pairs(
 }
 
 /// The times that each bag covers.
-fn spans(recorded: &Recorded) -> ById<usize, Option<Span>> {
+pub(super) fn spans(recorded: &Recorded) -> ById<usize, Option<Span>> {
     let mut spans: ById<usize, Option<Span>> = ById::default();
     for stream in &recorded.streams {
         if let Some((first, last)) = recorded.messages.bounds(stream.times) {

@@ -158,7 +158,7 @@ fn of_steps(sheet: &FigureSheet<'_>, drawing: &Drawing) -> Result<Scene> {
         span.start.plus(span.nanos() / 2)
     };
     let many = source.phases.len();
-    // In the only window, what begins could not be told from what is there from the start.
+    // In the only window, what begins could not be distinguished from what is there from the start.
     let base = usize::from(many == 2);
     let middles: Vec<Stamp> = (1 - base..many - 1).map(middle).collect();
     let mission = source.mission.joined(&middles);

@@ -19,7 +19,7 @@ import choose
 import firefox
 import folded
 import sight
-import told
+import changes
 import touch
 import webdriver
 from webdriver import Browser
@@ -411,7 +411,7 @@ def main(page, evolution, hostile_page, svg, folded_page, topic_timeline, report
     choose.check(url(page), url(topic_timeline), evolution)
     touch.check(url(page))
     sight.check(url(page), url(folded_page), url(topic_timeline))
-    told.check(url(page), url(topic_timeline), url(quiet), evolution, headlines(evolution))
+    changes.check(url(page), url(topic_timeline), url(quiet), evolution, headlines(evolution))
     if is_there(axe):
         axe.check(url(page), url(topic_timeline), report)
     if is_there(firefox):

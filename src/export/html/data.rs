@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::changes::{ChangedWindow, PageChanges, PageClock};
 use super::element_runs::ElementRuns;
-use super::told::{PageClock, Told, ToldWindow};
 use super::{HtmlPage, PageGraph};
 use crate::base::cast;
 use crate::base::digest;
@@ -43,7 +43,7 @@ struct PageData<'a> {
     /// Milliseconds since 1970 at the start of the first window.
     epoch: i64,
     /// The headlines of each window that has any.
-    reported: &'a [ToldWindow],
+    reported: &'a [ChangedWindow],
     /// Start, end and name of each phase.
     phases: Vec<(f64, f64, String)>,
     /// The lifelines, from top to bottom.
@@ -92,11 +92,11 @@ struct GraphData<'a> {
 struct RowData(i64, String, u8, Vec<f64>, Vec<f64>, Vec<(f64, u8, EventId)>);
 
 /// The data as JSON that is safe between the tags of a page.
-pub(super) fn json(page: &HtmlPage<'_>, still: usize, told: &Told) -> String {
+pub(super) fn json(page: &HtmlPage<'_>, still: usize, changes: &PageChanges) -> String {
     let whole = &page.whole;
     let mission = page.sequence.mission;
     let frames = &whole.view.frames;
-    let (clock, places) = (told.clock, &told.places);
+    let (clock, places) = (changes.clock, &changes.places);
     let mut words = Words::default();
     let mut graphs = vec![graph(page, whole, places, clock, &mut words)];
     graphs.extend(
@@ -105,16 +105,16 @@ pub(super) fn json(page: &HtmlPage<'_>, still: usize, told: &Told) -> String {
             .map(|folded| graph(page, folded, places, clock, &mut words)),
     );
     let style = page.style;
-    let lives = told.lives.as_ref();
+    let lives = changes.lives.as_ref();
     let data = PageData {
         graphs,
         words: words.list,
         starts: frames.iter().map(|f| clock.secs(f.span.start)).collect(),
         ends: frames.iter().map(|f| clock.secs(f.span.end)).collect(),
         epoch: clock.0.0.div_euclid(1_000_000),
-        reported: &told.windows,
+        reported: &changes.windows,
         phases: phases(mission, clock),
-        rows: lives.map_or_else(Vec::new, |lives| rows(lives, told)),
+        rows: lives.map_or_else(Vec::new, |lives| rows(lives, changes)),
         takeovers: lives.map_or_else(Vec::new, |lives| takeovers(lives, clock)),
         sizes: [
             style.edge.size.min(style.topic.small).min(style.node.small),
@@ -190,12 +190,12 @@ fn graph<'a>(
 
 fn phases(mission: &Mission, clock: PageClock) -> Vec<(f64, f64, String)> {
     let log = &mission.log;
-    // Where no event is told, phases would claim changes.
-    let is_told = log.headlines(mission.span).next().is_some();
+    // Where no event is listed, phases would claim changes.
+    let is_listed = log.headlines(mission.span).next().is_some();
     let phases = log
         .phases
         .iter()
-        .filter(|_| is_told && log.phases.len() > 1);
+        .filter(|_| is_listed && log.phases.len() > 1);
     let phases = phases.map(|p| {
         let name = visible(&p.name).into_owned();
         (clock.secs(p.span.start), clock.secs(p.span.end), name)
@@ -203,10 +203,10 @@ fn phases(mission: &Mission, clock: PageClock) -> Vec<(f64, f64, String)> {
     phases.collect()
 }
 
-fn rows(timeline: &Timeline, told: &Told) -> Vec<RowData> {
-    let clock = told.clock;
+fn rows(timeline: &Timeline, changes: &PageChanges) -> Vec<RowData> {
+    let clock = changes.clock;
     let row = |row: &Row| {
-        let place = row.what().and_then(|what| told.places.get(&what));
+        let place = row.what().and_then(|what| changes.places.get(&what));
         let is_inferred = f64::from(u8::from(row.is_inferred));
         let lives = row
             .lives

@@ -19,7 +19,7 @@ use crate::layout::{
 /// The shapes, width over height, of the pages on which the contents of namespaces are laid out: columns, squares, rows.
 const SHAPES: [f64; 3] = [0.3, 1.0, 3.0];
 /// The distance of lines that leave a box of a block on the same side, and the share of the side that they may take: as
-/// far apart as the heads of arrows must be to be told apart.
+/// far apart as the heads of arrows must be to look like several.
 const PORT_STEP: f64 = 9.0;
 const PORTS: f64 = 0.6;
 /// The straight pieces that stand for each curve of a route when crossings are counted.
@@ -49,13 +49,20 @@ pub(crate) fn best(
     for at in (0..many).filter(|_| options.is_tight) {
         for shape in 0..SHAPES.len() {
             let mut shapes = best.2.clone();
-            if blocks.contents[at][shape].1.size != blocks.contents[at][shapes[at]].1.size {
+            if blocks.contents[at][shape].layout.size != blocks.contents[at][shapes[at]].layout.size
+            {
                 shapes[at] = shape;
                 best = judged(shapes).into_iter().fold(best, better);
             }
         }
     }
     Some((best.0, best.1))
+}
+
+/// The contents of a namespace with a layout.
+struct Contents {
+    sub: Subplan,
+    layout: Layout,
 }
 
 /// A part with the contents of its outermost namespaces laid out in each shape.
@@ -65,8 +72,8 @@ struct Blocks<'a> {
     part: &'a Component,
     orientation: Orientation,
     cut: Cut,
-    /// The contents of each namespace, with their layout in each shape.
-    contents: Vec<Vec<(Subplan, Layout)>>,
+    /// The contents of each namespace, in each shape.
+    contents: Vec<Vec<Contents>>,
 }
 
 impl<'a> Blocks<'a> {
@@ -93,7 +100,7 @@ impl<'a> Blocks<'a> {
             let sub = Subplan::new(plan, part, space, |v| cut.space[v] == space);
             let draft = Draft::new(&sub.plan, &options)?;
             let (_, layout) = draft.assembled(&sub.plan, &options, orientation);
-            Some((sub, layout))
+            Some(Contents { sub, layout })
         };
         let spaces = cut.spaces.par_iter();
         let contents = spaces.map(|space| {
@@ -102,7 +109,7 @@ impl<'a> Blocks<'a> {
                 .map(|shape| laid_out(*space, *shape))
                 .collect()
         });
-        let contents: Option<Vec<Vec<(Subplan, Layout)>>> = contents.collect();
+        let contents: Option<Vec<Vec<Contents>>> = contents.collect();
         Some(Self {
             contents: contents?,
             plan,
@@ -117,9 +124,10 @@ impl<'a> Blocks<'a> {
     fn placed(&self, shapes: &[usize]) -> Option<PlacedPart> {
         let (plan, part, cut) = (self.plan, self.part, &self.cut);
         let chosen = self.contents.iter().zip(shapes);
-        let chosen: Vec<&(Subplan, Layout)> = chosen.map(|(all, shape)| &all[*shape]).collect();
-        let frames = chosen.iter().zip(&cut.spaces).map(|((_, layout), space)| {
-            let inside = Rect::new(0.0, 0.0, layout.size.w, layout.size.h);
+        let chosen: Vec<&Contents> = chosen.map(|(all, shape)| &all[*shape]).collect();
+        let frames = chosen.iter().zip(&cut.spaces).map(|(contents, space)| {
+            let size = contents.layout.size;
+            let inside = Rect::new(0.0, 0.0, size.w, size.h);
             plan.clusters[part.clusters[space - 1]].frame(inside, PADDING)
         });
         let frames: Vec<Rect> = frames.collect();
@@ -130,7 +138,7 @@ impl<'a> Blocks<'a> {
         let (spaces, free) = layout.boxes.split_at(frames.len());
         for (at, place) in spaces.iter().enumerate() {
             let by = Point::new(place.x - frames[at].x, place.y - frames[at].y);
-            chosen[at].0.put(&chosen[at].1, by, &mut placed);
+            chosen[at].sub.put(&chosen[at].layout, by, &mut placed);
             placed.clusters[cut.spaces[at] - 1] = *place;
         }
         for (&v, at) in cut.free.iter().zip(free) {
@@ -151,8 +159,8 @@ impl<'a> Blocks<'a> {
             let label = placed.routes[at].label.zip(size);
             let label = label.map(|(middle, size)| Rect::around(middle, size));
             let is_crossed = |label: Rect| {
-                let others = lines.iter().enumerate().filter(|(other, _)| *other != at);
-                others.into_iter().any(|(_, line)| line.meets(&label))
+                let mut others = lines.iter().enumerate();
+                others.any(|(other, line)| other != at && line.meets(&label))
             };
             if label.is_some_and(is_crossed) {
                 // It is placed elsewhere, once everything has its place.

@@ -15,9 +15,9 @@ use crate::mission::event_log::{
     Event, EventId, Kind, LogFormat, LogRow, row_lines, sentence_with,
 };
 
-/// The most moments that are told: with four the sentence fills three lines of a page.
+/// The most moments in it: with four the sentence fills three lines of a page.
 const MOST_MOMENTS: usize = 3;
-/// What is told of a moment: what an eye takes in at once.
+/// The changes of a moment in it: what an eye takes in at once.
 const MOMENT: Most = Most {
     kinds: 2,
     elements: 2,
@@ -37,7 +37,7 @@ pub(crate) fn summary(mission: &Mission, info: &Info) -> String {
     if log.compares {
         return match all.len() {
             0 => "no difference".to_owned(),
-            many => words::count(many, "difference") + ": " + &told(mission, &all, MOMENT),
+            many => words::count(many, "difference") + ": " + &described(mission, &all, MOMENT),
         };
     }
     if mission.messages == 0 && all.is_empty() {
@@ -48,7 +48,7 @@ pub(crate) fn summary(mission: &Mission, info: &Info) -> String {
         let words = lines.first().map_or("", |line| &line.words).to_owned();
         (one.time, words)
     });
-    // Remarks on the recorder are told only if nothing else is.
+    // Remarks on the recorder count only if there is nothing else.
     let changes = all.iter().copied().filter(|(_, e)| !e.kind.is_remark());
     let changes: Vec<Headline<'_>> = changes.collect();
     let changes = if changes.is_empty() { &all } else { &changes };
@@ -56,8 +56,8 @@ pub(crate) fn summary(mission: &Mission, info: &Info) -> String {
     let mut moments: Vec<&[Headline<'_>]> = changes.chunk_by(near).collect();
     moments.sort_by_key(|moment| Reverse(weight(moment)));
     moments.truncate(MOST_MOMENTS);
-    let told = |m: &&[Headline<'_>]| (m[0].1.time, told(mission, m, MOMENT));
-    let mut moments: Vec<_> = moments.iter().map(told).chain(gaps.take(1)).collect();
+    let timed = |m: &&[Headline<'_>]| (m[0].1.time, described(mission, m, MOMENT));
+    let mut moments: Vec<_> = moments.iter().map(timed).chain(gaps.take(1)).collect();
     moments.sort();
     let moments = moments.into_iter().map(|(at, words)| {
         let at = words::offset_seconds(mission.offset(at));
@@ -97,7 +97,7 @@ fn weight(headlines: &[Headline<'_>]) -> u32 {
     headlines.iter().map(|(_, e)| e.weight).sum()
 }
 
-/// The most kinds of changes that are told, and the most elements of each.
+/// The most kinds of changes in a description, and the most elements of each.
 #[derive(Clone, Copy)]
 pub(crate) struct Most {
     pub(crate) kinds: usize,
@@ -105,7 +105,7 @@ pub(crate) struct Most {
 }
 
 /// Some changes in words, the kinds with most elements first: `planner, controller and 5 more of /robot1 stopped, /plan appeared`.
-pub(crate) fn told(mission: &Mission, headlines: &[Headline<'_>], most: Most) -> String {
+pub(crate) fn described(mission: &Mission, headlines: &[Headline<'_>], most: Most) -> String {
     let mut kinds: BTreeMap<(bool, Kind), Vec<Headline<'_>>> = BTreeMap::new();
     for headline in headlines {
         let is_edge = matches!(headline.1.what, Element::Publish(_) | Element::Subscribe(_));

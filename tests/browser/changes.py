@@ -53,10 +53,10 @@ def listed(b, evolution, headlines):
     start = evolution["windows"][0]["start_ns"]
     events = {e["id"]: e for own in headlines for e in own}
     rows = b.js(ROWS)
-    told = [row for row in rows if not row[3].split(" ", 1)[1].startswith("is back")]
-    assert sorted(row[0] for row in told) == sorted(events), (len(told), len(events))
+    entries = [row for row in rows if not row[3].split(" ", 1)[1].startswith("is back")]
+    assert sorted(row[0] for row in entries) == sorted(events), (len(entries), len(events))
     assert [row[1] for row in rows] == sorted(row[1] for row in rows), "not in order of time"
-    for number, at, when, text in told:
+    for number, at, when, text in entries:
         event = events[number]
         exact = (event["time_ns"] - start) / 1e9
         assert abs(at - exact) < 2e-3, (at, exact, text)

@@ -1,4 +1,4 @@
-//! The changes as the page tells them, read from the event log: per window for the script, and as a table for readers without
+//! The changes that a page lists, read from the event log: per window for the script, and as a table for readers without
 //! scripts, for printing, and for links into the mission.
 
 use std::collections::BTreeMap;
@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::{HtmlPage, PageGraph};
-use crate::base::time::Stamp;
+use crate::base::time::{Span, Stamp};
 use crate::base::words::{self, visible};
 use crate::draw::paint::xml::Xml;
 use crate::draw::picture::change_counts;
@@ -21,12 +21,12 @@ use crate::view::{Frame, Headline, Lasting};
 /// The headlines of a window, and the elements that are back in it: its index, the number of headlines, the texts of the
 /// three badges, its lines, and the film's headline.
 #[derive(Serialize)]
-pub(super) struct ToldWindow(usize, usize, [String; 3], Vec<ToldLine>, String);
+pub(super) struct ChangedWindow(usize, usize, [String; 3], Vec<ChangeLine>, String);
 
 /// A change: its time in seconds, its sign (0 appeared, 1 vanished, 2 changed), its element (-1 for one that is not drawn),
 /// its sentence, its index in the log, and its time in words.
 #[derive(Serialize)]
-struct ToldLine(f64, u8, i64, String, EventId, String);
+struct ChangeLine(f64, u8, i64, String, EventId, String);
 
 /// The most headlines of one window that are listed; the rest is counted.
 const MOST_REPORTED: usize = 200;
@@ -59,10 +59,10 @@ fn places(drawn: &PageGraph<'_>) -> BTreeMap<Element, u32> {
     places
 }
 
-/// What a page tells of the event log.
-pub(super) struct Told {
+/// The changes that a page lists.
+pub(super) struct PageChanges {
     /// The windows with changes.
-    pub(super) windows: Vec<ToldWindow>,
+    pub(super) windows: Vec<ChangedWindow>,
     /// The element that represents each node, topic and edge.
     pub(super) places: BTreeMap<Element, u32>,
     pub(super) clock: PageClock,
@@ -70,7 +70,7 @@ pub(super) struct Told {
     pub(super) lives: Option<Timeline>,
 }
 
-impl Told {
+impl PageChanges {
     pub(super) fn new(page: &HtmlPage<'_>) -> Self {
         let (mission, whole) = (page.sequence.mission, &page.whole);
         let view = whole.view;
@@ -97,7 +97,7 @@ impl Told {
             let text = format!("{name} is back after {}", words::duration(away));
             let when = words::offset_tenths(mission.offset(end));
             let at = secs(frame, end);
-            Some(ToldLine(at, 2, place(&last.what), text, last.event, when))
+            Some(ChangeLine(at, 2, place(&last.what), text, last.event, when))
         };
         let line = |frame: &Frame, headline: &Headline| {
             let (event, line) = said.get(&headline.event)?;
@@ -115,20 +115,20 @@ impl Told {
             };
             let (at, place) = (secs(frame, event.time), place(&headline.what));
             let (text, id) = (line.words.clone(), headline.event);
-            Some(ToldLine(at, sign, place, text, id, when))
+            Some(ChangeLine(at, sign, place, text, id, when))
         };
         let frames = view.frames.iter().enumerate();
         let frames = frames.filter(|(_, frame)| frame.is_changed());
         let windows = frames.map(|(at, frame)| {
             let mut counts = change_counts(&frame.counts).map(|(text, _)| text);
             let returns = frame.lasting.iter().filter_map(|last| back(frame, last));
-            let returns: Vec<ToldLine> = returns.collect();
+            let returns: Vec<ChangeLine> = returns.collect();
             if frame.headlines.is_empty() {
                 counts[2] = format!("{} back", returns.len());
             }
             let headlines = frame.headlines.iter().take(MOST_REPORTED);
             let headlines = headlines.filter_map(|headline| line(frame, headline));
-            ToldWindow(
+            ChangedWindow(
                 at,
                 frame.counts.total(),
                 counts,
@@ -136,19 +136,25 @@ impl Told {
                 visible(&frame.words(MOST_PHRASES)).into_owned(),
             )
         });
-        let windows: Vec<ToldWindow> = windows.collect();
-        // The list has every mark: a part of an event is marked only if the event is told in the same window.
+        let windows: Vec<ChangedWindow> = windows.collect();
+        // The list has every mark: a part of an event is marked only if the event is listed in the same window.
+        let mut listed: BTreeMap<EventId, Vec<Span>> = BTreeMap::new();
+        for window in &windows {
+            for line in &window.3 {
+                listed
+                    .entry(line.4)
+                    .or_default()
+                    .push(view.frames[window.0].span);
+            }
+        }
         let whole = |id| mission.log.events.get(id).and_then(|event| event.part_of);
-        let is_told = |mark: &RowMark, id: EventId| {
-            let (id, at) = (whole(id).unwrap_or(id), mark.at);
-            let mut own = windows
-                .iter()
-                .filter(|w| view.frames[w.0].span.contains(at));
-            view.compares || own.any(|window| window.3.iter().any(|line| line.4 == id))
+        let is_listed = |mark: &RowMark, id: EventId| {
+            let spans = listed.get(&whole(id).unwrap_or(id));
+            view.compares || spans.is_some_and(|all| all.iter().any(|s| s.contains(mark.at)))
         };
         let mut lives = page.sequence.unfolded.and_then(|u| u.lives).cloned();
         for row in lives.iter_mut().flat_map(|lives| &mut lives.rows) {
-            let is_marked = |mark: &RowMark| mark.events.iter().any(|id| is_told(mark, *id));
+            let is_marked = |mark: &RowMark| mark.events.iter().any(|id| is_listed(mark, *id));
             row.marks.retain(is_marked);
         }
         Self {
@@ -165,7 +171,7 @@ impl Told {
             .windows
             .iter()
             .flat_map(|w| w.3.iter().map(|line| (w.0, line)));
-        let mut lines: Vec<(usize, &ToldLine)> = lines.collect();
+        let mut lines: Vec<(usize, &ChangeLine)> = lines.collect();
         // Windows may overlap.
         lines.sort_by(|(_, a), (_, b)| a.0.total_cmp(&b.0).then(a.4.cmp(&b.4)));
         lines.dedup_by(|(_, a), (_, b)| (a.0, a.4) == (b.0, b.4));
@@ -185,7 +191,7 @@ impl Told {
         xml.open("table")
             .open("tbody")
             .attribute("id", "allchanges");
-        for (window, ToldLine(at, _, _, text, event, when)) in lines.into_iter().take(MOST_ROWS) {
+        for (window, ChangeLine(at, _, _, text, event, when)) in lines.into_iter().take(MOST_ROWS) {
             let when = if compares { SIDES[window.min(1)] } else { when };
             xml.open("tr").attribute("data-entry", event).open("th");
             xml.open("a").attribute("href", format_args!("#t={at}"));
