@@ -1,6 +1,7 @@
 //! Names of nodes and topics, kept as recorded, cheap to clone, ordered.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
@@ -102,6 +103,46 @@ pub fn last_part(name: &str) -> &str {
         Some(part) if !part.is_empty() => part,
         _ => name,
     }
+}
+
+/// Last parts of names that are meaningless without the previous part.
+const VAGUE: [&str; 6] = ["data", "raw", "state", "status", "info", "events"];
+
+/// Whether a last part is meaningless without the previous one: `state`.
+pub(crate) fn is_vague(part: &str) -> bool {
+    VAGUE.contains(&part)
+}
+
+/// The names of a picture, each in the fewest of its last parts that no other name ends with: `cam_wrist/driver` beside
+/// other drivers, `planner` if there is one.
+pub(crate) struct ShortNames<'a>(BTreeMap<&'a str, Option<&'a str>>);
+
+impl<'a> FromIterator<&'a str> for ShortNames<'a> {
+    fn from_iter<T: IntoIterator<Item = &'a str>>(names: T) -> Self {
+        let mut only: BTreeMap<&str, Option<&str>> = BTreeMap::new();
+        for name in names {
+            for end in ends(name) {
+                let owner = only.entry(end).or_insert(Some(name));
+                *owner = owner.filter(|owner| *owner == name);
+            }
+        }
+        Self(only)
+    }
+}
+
+impl ShortNames<'_> {
+    /// The short form of a name; the whole name, if it was not among those given.
+    pub(crate) fn of<'n>(&self, name: &'n str) -> &'n str {
+        let is_alone = |end: &&str| self.0.get(end) == Some(&Some(name)) && !is_vague(end);
+        ends(name).find(is_alone).unwrap_or(name)
+    }
+}
+
+/// The last part of a name, its last two and so on, without the slash before them. Of more than four parts the whole name
+/// is as clear.
+fn ends(name: &str) -> impl Iterator<Item = &str> {
+    let ends = name.rmatch_indices('/').map(|(at, _)| &name[at + 1..]);
+    ends.filter(|end| !end.is_empty()).take(4)
 }
 
 /// Whether a node represents unnamed publishers: `/scan ?`, `/scan ? ×2`. Names in ROS contain no spaces.

@@ -15,6 +15,7 @@ mod ramp;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use self::name::PhaseNames;
 use self::partition::partition;
 use self::presence::{Presence, is_topics, presences};
 pub(crate) use self::presence::{fill, knows_publishers};
@@ -57,8 +58,7 @@ pub fn phases(elements: &Elements, sending: &Sending, whole: Span) -> Vec<Phase>
     let starts = boundaries(elements, &found, &starts, whole, is_topics(&present));
     let spans = between(&starts, whole.end);
     let (spans, found, ramps) = ramp::joined(&spans, &found, whole.nanos());
-    let unit = if is_topics(&present) { "topic" } else { "node" };
-    reported(&spans, &found, &ramps, unit)
+    reported(&spans, &found, &ramps, &present)
 }
 
 /// The phases for given intervals, such as the user's, with the changes between them, by majority.
@@ -71,8 +71,7 @@ pub(crate) fn of_spans(
     let present = presences(elements, sending, whole);
     let of = |span: &Span| configuration(elements, sending, &present, *span);
     let found: Vec<Configuration> = spans.iter().map(of).collect();
-    let unit = if is_topics(&present) { "topic" } else { "node" };
-    reported(spans, &found, &vec![false; spans.len()], unit)
+    reported(spans, &found, &vec![false; spans.len()], &present)
 }
 
 fn configuration(
@@ -148,10 +147,19 @@ fn differing(
     times.get(times.len() / 2).copied()
 }
 
-fn reported(spans: &[Span], found: &[Configuration], ramps: &[bool], unit: &str) -> Vec<Phase> {
+fn reported(
+    spans: &[Span],
+    found: &[Configuration],
+    ramps: &[bool],
+    present: &[Presence],
+) -> Vec<Phase> {
+    let unit = if is_topics(present) { "topic" } else { "node" };
+    let all: BTreeSet<Arc<str>> = found.iter().flat_map(|c| c.names.iter().cloned()).collect();
+    let names = PhaseNames::new(unit, all.iter().map(|name| &**name));
     let nothing = BTreeSet::new();
     let phase = |k: usize| {
-        let before = k.checked_sub(1).map_or(&nothing, |b| &found[b].names);
+        let earlier = k.checked_sub(1).map(|b| &found[b].names);
+        let before = earlier.unwrap_or(&nothing);
         let added: Vec<&Arc<str>> = found[k].names.difference(before).collect();
         let removed: Vec<&Arc<str>> = before.difference(&found[k].names).collect();
         let same_as = (0..k).find(|earlier| is_same(&found[*earlier], &found[k]));
@@ -159,9 +167,9 @@ fn reported(spans: &[Span], found: &[Configuration], ramps: &[bool], unit: &str)
         Phase {
             span: spans[k],
             name: if ramps[k] {
-                name::ramp(found[k].names.len(), unit)
+                names.ramp(found[k].names.len())
             } else {
-                name::of_changes(k == 0, &added, &removed, unit)
+                names.of_changes(earlier, &added, &removed)
             },
             nodes_added: count(&added),
             nodes_removed: count(&removed),

@@ -7,7 +7,7 @@ use std::mem::discriminant;
 use super::items::Viewed;
 use super::state::LivingItems;
 use super::{Frame, Headline, ItemKind, Lasting, Phrase};
-use crate::base::name::{is_quiet, namespace};
+use crate::base::name::{ShortNames, is_quiet};
 use crate::base::time::Stamp;
 use crate::base::words;
 use crate::graph::{Element, Elements, NodeId, TopicId, Wiring};
@@ -38,8 +38,8 @@ pub(crate) struct CaptionWriter<'a> {
     /// The last event of the windows so far.
     last: Option<Stamp>,
     wiring: Wiring,
-    /// The namespace below which the names of the present window are written.
-    home: &'a str,
+    /// The short names of the picture's nodes and topics.
+    names: [ShortNames<'a>; 2],
 }
 
 /// The events of a window, in the order of their phrases, each with the values that are equal within one
@@ -48,24 +48,31 @@ type Groups = BTreeMap<(u8, [String; 2]), Phrase>;
 
 impl<'a> CaptionWriter<'a> {
     pub(crate) fn new(mission: &'a Mission, viewed: &'a Viewed<'a>) -> Self {
+        let elements = &mission.elements;
+        let nodes = elements.nodes.ids().map(Element::Node);
+        let topics = elements.topics.ids().map(Element::Topic);
+        let names = |all: &mut dyn Iterator<Item = Element>| {
+            let seen = all.filter(|what| viewed.sees(*what));
+            seen.map(|what| full_name(elements, viewed, what)).collect()
+        };
         Self {
-            elements: &mission.elements,
+            elements,
             viewed,
             log: &mission.log,
             parts: mission.log.all_parts(),
             start: mission.span.start,
             is_still: mission.windows.len() == 1,
             last: None,
-            wiring: mission.elements.wiring(|_, _| true),
-            home: "",
+            wiring: elements.wiring(|_, _| true),
+            names: [
+                names(&mut nodes.into_iter()),
+                names(&mut topics.into_iter()),
+            ],
         }
     }
 
     /// Puts the events of a window into words; `after` is what lives at its end.
     pub(crate) fn write(&mut self, frame: &mut Frame, after: &LivingItems) {
-        let whats = frame.headlines.iter().map(|h| h.what);
-        let whats = whats.chain(frame.lasting.iter().map(|l| l.what));
-        self.home = home(whats.filter_map(|what| self.subject(what)));
         let mut groups = Groups::new();
         for headline in &frame.headlines {
             self.phrase(headline).add(&mut groups, headline.event);
@@ -98,7 +105,7 @@ impl<'a> CaptionWriter<'a> {
         self.log.events.get(id)
     }
 
-    /// The line below the headline: `/robot1 · 4:26 · arm_controller gets no detections`; in a window in which nothing
+    /// The line below the headline: `4:26 · arm_controller gets no detections`; in a window in which nothing
     /// changes `no change since 3:20`.
     fn note(&mut self, frame: &Frame, after: &LivingItems) -> String {
         if self.log.compares {
@@ -120,7 +127,7 @@ impl<'a> CaptionWriter<'a> {
                 None => "no change yet".to_owned(),
             };
         }
-        let mut parts = vec![clip(self.home)];
+        let mut parts = Vec::new();
         if let Some((first, last)) = span {
             self.last = Some(last);
             let (first, last) = (self.moment(first), self.moment(last));
@@ -307,36 +314,11 @@ impl<'a> CaptionWriter<'a> {
         }
     }
 
-    /// The name of a node (as a role) or topic below `home`, in full outside it; of an edge, that of its topic.
+    /// The name of a node (as a role) or topic in the fewest parts that identify it in the picture; of an edge, that of its
+    /// topic.
     fn name(&self, what: Element) -> String {
-        let name = match what {
-            Element::Node(id) => self.node_name(id),
-            _ => self.elements.names(what).1,
-        };
-        let name = without_transport(name.unwrap_or_default());
-        let below = name
-            .strip_prefix(self.home)
-            .filter(|_| !self.home.is_empty());
-        let below = below.and_then(|rest| rest.strip_prefix('/'));
-        clip(below.unwrap_or(name))
-    }
-
-    /// The node, or the topic if the event is about no node.
-    fn subject(&self, what: Element) -> Option<&'a str> {
-        match self.elements.ends(what).0 {
-            Some(node) => self.node_name(node),
-            None => self.elements.names(what).1,
-        }
-    }
-
-    /// The label of its box; its role if it has no box of its own.
-    fn node_name(&self, id: NodeId) -> Option<&'a str> {
-        let item = self.viewed.item_of(Element::Node(id));
-        let item = item.and_then(|at| self.viewed.items.get(at));
-        match item.filter(|i| i.kind == ItemKind::Node && !i.is_replica) {
-            Some(item) => Some(&item.label),
-            None => self.elements.nodes.get(id).map(|n| &*n.role),
-        }
+        let names = &self.names[usize::from(!matches!(what, Element::Node(_)))];
+        clip(names.of(full_name(self.elements, self.viewed, what)))
     }
 
     fn people(&self, nodes: &[NodeId]) -> String {
@@ -411,39 +393,16 @@ fn clip(name: &str) -> String {
     words::shorten(name, LONGEST_NAME).into_owned()
 }
 
-/// The namespace below which names are written without it: the one around all names that have one, else that
-/// of most of them; empty if all are at the root.
-fn home<'n>(names: impl Iterator<Item = &'n str>) -> &'n str {
-    let spaces = names.map(|name| namespace(without_transport(name)));
-    let spaces: Vec<&str> = spaces.filter(|space| *space != "/").collect();
-    let Some(first) = spaces.first() else {
-        return "";
+/// The name of a node as its box has it, or its role if it has no box of its own; that of a topic, or of an edge's.
+fn full_name<'a>(elements: &'a Elements, viewed: &'a Viewed<'a>, what: Element) -> &'a str {
+    let Element::Node(id) = what else {
+        return without_transport(elements.names(what).1.unwrap_or_default());
     };
-    let around = spaces.iter().fold(*first, |a, b| shared(a, b));
-    if !around.is_empty() {
-        return around;
+    let item = viewed.item_of(what).and_then(|at| viewed.items.get(at));
+    match item.filter(|i| i.kind == ItemKind::Node && !i.is_replica) {
+        Some(item) => &item.label,
+        None => elements.nodes.get(id).map_or("", |node| &*node.role),
     }
-    let mut most: BTreeMap<&str, (usize, &str)> = BTreeMap::new();
-    for space in spaces {
-        let end = space[1..].find('/').map_or(space.len(), |at| at + 1);
-        let (count, around) = most.entry(&space[..end]).or_insert((0, space));
-        (*count, *around) = (*count + 1, shared(around, space));
-    }
-    // The first of equal ones.
-    let best = most.values().rev().max_by_key(|(count, _)| *count);
-    best.map_or("", |(_, around)| around)
-}
-
-/// The namespace around two others; empty for the root.
-fn shared<'n>(a: &'n str, b: &str) -> &'n str {
-    let mut end = 0;
-    for (x, y) in a.split('/').zip(b.split('/')) {
-        if x != y {
-            break;
-        }
-        end += x.len() + 1;
-    }
-    &a[..end.saturating_sub(1).min(a.len())]
 }
 
 /// The name of an image topic without its transport.
@@ -455,7 +414,6 @@ fn without_transport(name: &str) -> &str {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::view::testing::mission;
     use crate::view::{Frame, Mark, ViewOptions, joined, view};
 
@@ -470,14 +428,17 @@ mod tests {
     }
 
     #[test]
-    fn started_nodes_are_named_below_their_namespace() {
+    fn names_have_the_fewest_parts_that_identify_them() {
         let frame = last(&["/a", "/a /cam/driver>/cam/image /cam/driver>/cam/info"]);
         assert_eq!(frame.words(usize::MAX), "+ driver starts");
-        assert!(frame.note.starts_with("/cam · "), "{}", frame.note);
-        assert_eq!(caption(&["/a /b>/t", "/a"]), "− /b stops");
+        assert_eq!(frame.note, "0:01");
+        assert_eq!(
+            caption(&["/a /arm/driver", "/a /cam/driver"]),
+            "− arm/driver stops; + cam/driver starts"
+        );
         assert_eq!(
             caption(&["/a /b>/t", "/a /c /d"]),
-            "− /b stops; + /c, /d start"
+            "− b stops; + c, d start"
         );
     }
 
@@ -490,11 +451,11 @@ mod tests {
         );
         assert_eq!(
             caption(&["/a>/t /b", "/a>/t /b</t"]),
-            "+ /b subscribes to /t"
+            "+ b subscribes to t"
         );
         assert_eq!(
             caption(&["/a>/t /a>/u /b>/t /b>/u", "/a>/t /a>/u /b"]),
-            "− /b no longer publishes /t, /u"
+            "− b no longer publishes t, u"
         );
         assert_eq!(caption(&["/a", "/a"]), "");
         assert_eq!(last(&["/a", "/a"]).note, "no change yet");
@@ -507,7 +468,7 @@ mod tests {
         let (frame, seen) = (&view.frames[1], view.seen(1));
         assert_eq!(
             frame.words(usize::MAX),
-            "/teleop takes over /cmd_vel from /planner"
+            "teleop takes over cmd_vel from planner"
         );
         let topic = seen.items.last().unwrap();
         assert_eq!(
@@ -526,21 +487,12 @@ mod tests {
         assert_eq!(frame.headlines.len(), 11);
         assert_eq!(
             frame.words(3),
-            "− /m stops; + /b, /c, /d, +1 start; + /e appears; +5"
+            "− m stops; + b, c, d, +1 start; + e appears; +5"
         );
-        assert!(joined(&frame.fitting(|_| true)).contains("/k 1 → 5 Hz"));
+        assert!(joined(&frame.fitting(|_| true)).contains("k 1 → 5 Hz"));
         let fitting = |most| joined(&frame.fitting(|words| joined(words).chars().count() < most));
         let short = fitting(40);
-        assert_eq!(short, "− /m stops; + /b, /c, /d, +1 start; +6");
-        assert_eq!(fitting(0), "− /m stops; +10");
-    }
-
-    #[test]
-    fn the_namespace_of_most_names_is_left_out() {
-        assert_eq!(home(["/r1/a", "/r1/nav/b", "/c"].into_iter()), "/r1");
-        assert_eq!(home(["/r1/x/a", "/r2/b", "/r2/c"].into_iter()), "/r2");
-        assert_eq!(home(["/a", "/b"].into_iter()), "");
-        assert_eq!(home(["/cam/image/compressed"].into_iter()), "/cam");
-        assert_eq!(shared("/robot1", "/robot10"), "");
+        assert_eq!(short, "− m stops; + b, c, d, +1 start; +6");
+        assert_eq!(fitting(0), "− m stops; +10");
     }
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::measured::LINE;
 use super::texts;
 use crate::base::geometry::Size;
+use crate::base::name::is_vague;
 use crate::base::words;
 use crate::draw::style::Edge;
 use crate::draw::text::{Fonts, Weight};
@@ -29,9 +30,6 @@ const FAMILIES: [&str; 8] = [
     "/ffmpeg",
     "/service_events",
 ];
-
-/// Last parts of names that are meaningless without the previous part.
-const VAGUE: [&str; 6] = ["data", "raw", "state", "status", "info", "events"];
 
 /// A row of words.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,7 +96,7 @@ fn last(name: &str) -> &str {
         .rmatch_indices('/')
         .map(|(at, _)| name.get(at + 1..).unwrap_or_default());
     let last = parts.next().unwrap_or(name);
-    if VAGUE.contains(&last) {
+    if is_vague(last) {
         parts.next().unwrap_or(last)
     } else {
         last

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::marks::{RowMark, Sign};
 use super::rows::{Level, Row, SendingBar};
 use super::source::FigureSource;
-use crate::base::name::{last_part, namespace};
+use crate::base::name::{ShortNames, last_part, namespace};
 use crate::base::time::Span;
 use crate::base::words;
 use crate::graph::NodeId;
@@ -132,18 +132,13 @@ pub(crate) fn together(
     let near = whole.nanos() / NEAR;
     let begun = whole.start.plus(near);
     let mut rows: Vec<Row> = rows.into_iter().map(Row::plain).collect();
-    let mut named: BTreeMap<String, usize> = BTreeMap::new();
-    for row in &rows {
-        *named.entry(last_part(&row.name).to_owned()).or_default() += 1;
-    }
+    let names: Vec<Arc<str>> = rows.iter().map(|row| Arc::clone(&row.name)).collect();
+    let names: ShortNames = names.iter().map(|name| &**name).collect();
     for row in &mut rows {
         // Elements that start with the recording look as if they existed from the beginning.
         row.marks
             .retain(|mark| mark.sign != Sign::Start || mark.at >= begun);
-        row.labels = vec![match last_part(&row.name) {
-            last if named[last] > 1 => row.name.to_string(),
-            last => last.to_owned(),
-        }];
+        row.labels = vec![names.of(&row.name).to_owned()];
     }
     let (open, fixed): (Vec<Row>, Vec<Row>) =
         rows.into_iter().partition(|row| !row.marks.is_empty());

@@ -102,21 +102,25 @@ pub(crate) fn clock(nanos: i64) -> String {
     words::moment(second * 1_000_000_000)
 }
 
+/// The fewest letters of a cut name by which an element is recognised.
+const FEWEST_LETTERS: usize = 3;
+
 impl PhaseLabel {
-    /// Writes the best name that fits.
+    /// Writes the best name that fits, or the beginning of the shortest; nothing if that would be a letter or two.
     fn write(&self, canvas: &mut PaperCanvas<'_>, cell: Rect, of: Type, color: Color) {
         // The text of the current phase is bold, and has the same words.
         let (bold, room) = (of.bold(), cell.w - 0.6);
         let mut names = self.names.iter();
         let name = names.find(|name| canvas.width(name, bold) <= room);
-        let is_number = |name: &String| name.chars().all(|c| c.is_ascii_digit());
-        // Truncated words are more informative than a number, if enough of them remain.
-        let name = match name.filter(|name| room < 9.0 || !is_number(name)) {
+        let name = match name {
             Some(name) => name.clone(),
-            None => canvas.cut(self.names.first().map_or("", |n| n), bold, room),
+            None => canvas.cut(self.names.last().map_or("", |n| n), bold, room),
         };
-        let at = cell.centre();
-        canvas.text_middle(at.x, at.y, of, color, &name);
+        let letters = name.chars().filter(|c| c.is_alphanumeric()).count();
+        if letters >= FEWEST_LETTERS || self.names.contains(&name) {
+            let at = cell.centre();
+            canvas.text_middle(at.x, at.y, of, color, &name);
+        }
     }
 }
 

@@ -23,31 +23,25 @@ pub(crate) fn numbered(source: &FigureSource<'_>) -> Vec<PhaseLabel> {
     source.phases.iter().enumerate().map(label).collect()
 }
 
-/// The phases with their names: the user's, else by the elements that start or end, else by their number. A
-/// phase without a name and with the same nodes as the previous one is merged with it.
+/// The phases with their names: the user's, else the elements that begin, else those that end, each name with as many of
+/// them as fit. A phase with the same nodes as the previous one is merged with it.
 pub(crate) fn named(source: &FigureSource<'_>) -> Vec<PhaseLabel> {
     let mut phases: Vec<PhaseLabel> = Vec::new();
     for (k, phase) in source.phases.iter().enumerate() {
-        let counts = counts(k, phase);
         if let Some(last) = phases.last_mut()
             && !source.is_named
-            && counts.is_empty()
+            && counts(k, phase).is_empty()
         {
             last.span.end = phase.span.end;
             continue;
         }
-        let name = phase.name.to_string();
-        let mut names = match name.split_once(": ").filter(|_| !source.is_named) {
+        let names = match phase.name.split_once(": ").filter(|_| !source.is_named) {
             Some((count, those)) => {
                 let sign: String = count.chars().take(1).collect();
                 shorter(&sign, those, phase.nodes_added.max(phase.nodes_removed))
             }
-            None => vec![name],
+            None => vec![phase.name.to_string()],
         };
-        if !source.is_named && !counts.is_empty() {
-            names.push(counts);
-        }
-        names.push((k + 1).to_string());
         phases.push(PhaseLabel {
             span: phase.span,
             names,
@@ -64,18 +58,21 @@ fn counts(k: usize, phase: &Phase) -> String {
     counts.join(" ")
 }
 
-/// The elements that began or ended, in fewer and fewer words: all that the phase names, then two and one of
-/// them.
+/// The elements that began or ended, in fewer and fewer words: all that the phase names, two and one of them with the
+/// number of the others, the shortest of them.
 fn shorter(sign: &str, those: &str, all: u32) -> Vec<String> {
     let mut names = vec![format!("{sign} {those}")];
-    let each = those.split(", ").flat_map(|part| part.split(" and "));
-    let each: Vec<&str> = each.collect();
+    let (first, last) = those.rsplit_once(" and ").unwrap_or((those, ""));
+    let last = Some(last).filter(|last| !last.is_empty() && !last.ends_with(" more"));
+    let each: Vec<&str> = first.split(", ").chain(last).collect();
     for most in [2, 1] {
         let rest = (all as usize).saturating_sub(most);
         if each.len() > most && rest > 0 {
             names.push(format!("{sign} {}, +{rest}", each[..most].join(", ")));
         }
     }
+    let short = each.iter().min_by_key(|name| name.chars().count());
+    names.extend(short.map(|name| format!("{sign} {name}")));
     names
 }
 

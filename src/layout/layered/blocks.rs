@@ -149,7 +149,14 @@ impl<'a> Blocks<'a> {
         }
         // The way between along and across and the page is the same in both directions.
         let mut placed = placed.on_page(self.orientation);
-        let turns = cut.connect(plan, part, &mut placed)?;
+        let routes = placed.routes.clone();
+        let turns = cut.connect(plan, part, &mut placed, &[])?;
+        // Around words as well, if nothing is in the way there: that is no reason to prefer another drawing.
+        let words = self.words(&placed);
+        let through = std::mem::replace(&mut placed.routes, routes);
+        if words.is_empty() || cut.connect(plan, part, &mut placed, &words).is_none() {
+            placed.routes = through;
+        }
         let lines: Vec<Line> = placed.routes.iter().map(Line::new).collect();
         placed.crossings = turns + crossings(&lines);
         for (at, link) in part.links.iter().enumerate() {
@@ -168,6 +175,25 @@ impl<'a> Blocks<'a> {
             }
         }
         Some(placed.on_page(self.orientation))
+    }
+
+    /// The words at the bottom left of namespaces, x along the edges and y across.
+    fn words(&self, placed: &PlacedPart) -> Vec<Rect> {
+        let clusters = self.part.clusters.iter().zip(&placed.clusters);
+        let words = clusters.map(|(&at, frame)| {
+            let size = self.plan.clusters[at].footer;
+            match self.orientation {
+                Orientation::LeftRight => {
+                    let corner = (frame.x + PADDING, frame.bottom() - size.h);
+                    Rect::new(corner.0, corner.1, size.w, size.h)
+                }
+                Orientation::TopBottom => {
+                    let corner = (frame.right() - size.h, frame.y + PADDING);
+                    Rect::new(corner.0, corner.1, size.h, size.w)
+                }
+            }
+        });
+        words.filter(|words| words.w > 0.0 && words.h > 0.0).collect()
     }
 }
 
@@ -230,11 +256,17 @@ impl Cut {
         }
     }
 
-    /// Leads the routes between the blocks on to the boxes inside, x along the edges and y across. Returns how many turn
-    /// there, which costs a reader as much as a crossing; `None` if one is blocked.
-    fn connect(&self, plan: &Plan, part: &Component, placed: &mut PlacedPart) -> Option<u64> {
+    /// Leads the routes between the blocks on to the boxes inside, around other boxes and `words`, x along the edges and y
+    /// across. Returns how many turn there, which costs a reader as much as a crossing; `None` if one is blocked.
+    fn connect(
+        &self,
+        plan: &Plan,
+        part: &Component,
+        placed: &mut PlacedPart,
+        words: &[Rect],
+    ) -> Option<u64> {
         let mut turns = 0;
-        let mut map = Map::new(&placed.boxes);
+        let mut map = Map::new(&[&placed.boxes, words].concat());
         for is_end in [true, false] {
             let mut sides: BTreeMap<(usize, bool), Vec<usize>> = BTreeMap::new();
             for &link in &self.between {
