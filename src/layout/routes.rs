@@ -6,8 +6,11 @@ pub(crate) mod around;
 use super::{LayerItem, Layers, Outline, Route};
 use crate::base::geometry::{Point, Size};
 
-/// The distance of neighbouring ports, if the side of a box is long enough.
-const PORT_STEP: f64 = 6.0;
+/// The distance of neighbouring ports, if the side of a box is long enough: the heads of arrows are 7 px wide, and closer
+/// than 9 px they look like one.
+pub(crate) const PORT_STEP: f64 = 9.0;
+/// The share of a side that ports may take: beyond it a capsule's end is too round for a head.
+pub(crate) const PORTS: f64 = 0.8;
 
 /// The input of a router, with x along and y across: the placed vertices and the layers' extents.
 pub(crate) struct RoutingPlane<'a> {
@@ -108,7 +111,7 @@ impl RoutingPlane<'_> {
         let shares = |a: &(usize, usize), b: &(usize, usize)| a.0 == b.0 && is_bend(a.0);
         let ports: Vec<&[(usize, usize)]> = chains.chunk_by(shares).collect();
         let n = ports.len() as f64;
-        let span = (self.size[v].h * 0.6).min(n * PORT_STEP);
+        let span = (self.size[v].h * PORTS).min(n * PORT_STEP);
         let port = |i: usize| self.across[v] + ((i as f64 + 0.5) / n - 0.5) * span;
         let ports = ports.iter().enumerate();
         ports

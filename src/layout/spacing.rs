@@ -5,6 +5,7 @@
 use std::collections::BTreeMap;
 
 use crate::base::geometry::{Point, Rect, Size};
+use crate::layout::routes::{PORT_STEP, PORTS};
 use crate::layout::{
     Component, LayerItem, LayerRows, Layers, LayoutOptions, Link, Orientation, Plan, first_bend,
     include,
@@ -15,6 +16,9 @@ const BOX_GAP: f64 = 12.0;
 const EDGE_GAP: f64 = 7.0;
 /// The space between a cluster's border and its contents, and outside of it.
 pub(crate) const PADDING: f64 = 7.0;
+/// How much higher a box may become for the edges at its sides: the heads of four lines are apart on a box of one line, and
+/// it still looks like the others.
+const MOST_GROWN: f64 = 2.0;
 /// The space below a title for the heads of arrows from above: the title is painted over their lines.
 const HEAD: f64 = 9.0;
 const MARGIN: f64 = 4.0;
@@ -93,7 +97,12 @@ impl<'a> Spacing<'a> {
                 *label = label.max(turned(size, orientation).w);
             }
         }
-        let size = |&v: &usize| turned(plan.vertices[v].size, orientation);
+        let size = |(at, &v): (usize, &usize)| {
+            let size = turned(plan.vertices[v].size, orientation);
+            let ports = layers.up[at].len().max(layers.down[at].len());
+            let wanted = ports as f64 * PORT_STEP / PORTS;
+            Size::new(size.w, size.h.max(wanted.min(size.h * MOST_GROWN)))
+        };
         let title = |&c: &usize| {
             let cluster = &plan.clusters[c];
             turned(Size::new(cluster.words(), cluster.title.h), orientation)
@@ -105,7 +114,7 @@ impl<'a> Spacing<'a> {
         Self {
             layers,
             orientation,
-            size: part.vertices.iter().map(size).collect(),
+            size: part.vertices.iter().enumerate().map(size).collect(),
             loops,
             label,
             worded,

@@ -449,10 +449,7 @@ mod tests {
             caption(&["=/s/scan@15", "=/s/scan@7.4"]),
             "scan 15 → 7.4 Hz"
         );
-        assert_eq!(
-            caption(&["/a>/t /b", "/a>/t /b</t"]),
-            "+ b subscribes to t"
-        );
+        assert_eq!(caption(&["/a>/t /b", "/a>/t /b</t"]), "+ b subscribes to t");
         assert_eq!(
             caption(&["/a>/t /a>/u /b>/t /b>/u", "/a>/t /a>/u /b"]),
             "− b no longer publishes t, u"

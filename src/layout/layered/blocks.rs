@@ -11,6 +11,7 @@ use super::subplan::Subplan;
 use super::{Draft, PlacedPart};
 use crate::base::geometry::{Point, Rect, Size, polyline};
 use crate::layout::routes::around::{End, Map, meets};
+use crate::layout::routes::{PORT_STEP, PORTS};
 use crate::layout::spacing::{PADDING, turned};
 use crate::layout::{
     Component, Layout, LayoutOptions, Link, Orientation, Outline, Plan, Route, Vertex,
@@ -18,10 +19,6 @@ use crate::layout::{
 
 /// The shapes, width over height, of the pages on which the contents of namespaces are laid out: columns, squares, rows.
 const SHAPES: [f64; 3] = [0.3, 1.0, 3.0];
-/// The distance of lines that leave a box of a block on the same side, and the share of the side that they may take: as
-/// far apart as the heads of arrows must be to look like several.
-const PORT_STEP: f64 = 9.0;
-const PORTS: f64 = 0.6;
 /// The straight pieces that stand for each curve of a route when crossings are counted.
 const PIECES: u32 = 3;
 
@@ -193,7 +190,9 @@ impl<'a> Blocks<'a> {
                 }
             }
         });
-        words.filter(|words| words.w > 0.0 && words.h > 0.0).collect()
+        words
+            .filter(|words| words.w > 0.0 && words.h > 0.0)
+            .collect()
     }
 }
 
