@@ -19,6 +19,7 @@ mod presence;
 mod replicas;
 mod room;
 mod spaces;
+mod spotlight;
 pub(crate) mod title;
 mod topics;
 mod union;
@@ -31,6 +32,7 @@ pub use self::ids::unshown;
 use self::ids::{arrow_id, encoded, item_id};
 use self::measured::MeasuredGraph;
 use self::page::{GraphFit, PageFrame, Strip};
+use self::spotlight::Spotlight;
 use self::title::Title;
 pub use self::union::{Union, UnionElement, rate_label, sign};
 use crate::base::geometry::{Point, Size};
@@ -341,6 +343,13 @@ impl<'a> Picture<'a> {
         let view = self.measured.view;
         let boxes = self.boxes();
         let full = view.inhabited(seen);
+        let spotlight = Spotlight::new(&self.measured, (k, frame), seen);
+        let pale = |mut group: Group| {
+            if let Some(spotlight) = &spotlight {
+                spotlight.pale(&mut group);
+            }
+            group
+        };
         let spaces = self.measured.graph.spaces.iter().zip(&self.layout.clusters);
         let mut titles = Vec::new();
         let mut member_lists = frame.member_lists.iter();
@@ -369,9 +378,11 @@ impl<'a> Picture<'a> {
                 Some(at) => self.layout.clusters.get(at),
                 None => self.layout.boxes.get(view.items.len()),
             };
-            titles.extend(place.and_then(|place| boxes.footer(footer, also, *place, (view, k))));
+            let words = place.and_then(|place| boxes.footer(footer, also, *place, (view, k)));
+            let is_news = words.as_ref().is_some_and(also::is_news);
+            titles.extend(if is_news { words } else { words.map(pale) });
         }
-        let [lines, labels] = self.lines(seen);
+        let [lines, labels] = self.lines(seen, spotlight.as_ref());
         let items = seen.items.iter().filter_map(|shown| {
             let at = shown.id as usize;
             Some((view.items.get(shown.item())?, self.cards.get(at)?, shown))
@@ -386,8 +397,16 @@ impl<'a> Picture<'a> {
             if let Some(presence) = view.presences.get(shown.item()) {
                 boxes.presence(&mut drawn, presence, card, item.kind);
             }
-            groups.push(drawn);
-            groups.extend(boxes.card_rows(card, view, k));
+            let rows = boxes.card_rows(card, view, k);
+            let all = std::iter::once(drawn).chain(rows);
+            if spotlight
+                .as_ref()
+                .is_none_or(|spot| spot.has_box(shown.item()))
+            {
+                groups.extend(all);
+            } else {
+                groups.extend(all.map(pale));
+            }
         }
     }
 

@@ -261,6 +261,20 @@ impl Group {
         }
     }
 
+    /// Mixes its colours with this part (0..=1) of another.
+    pub(crate) fn fade(&mut self, other: Color, part: f64) {
+        let fade = |color: &mut Color| *color = color.faded(other, part);
+        for piece in &mut self.pieces {
+            match piece {
+                Piece::Shape(shape) => {
+                    fade(&mut shape.fill);
+                    fade(&mut shape.stroke.color);
+                }
+                Piece::Text(text) => fade(&mut text.color),
+            }
+        }
+    }
+
     /// A group outside of the graph, such as a title: an id, which is also its class, and no content yet.
     pub fn named(id: &str) -> Self {
         Self {

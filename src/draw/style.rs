@@ -33,7 +33,7 @@ macro_rules! sections {
 }
 
 sections! {
-    Page { background: Color, margin: f64, text: Color, quiet: Color }
+    Page { background: Color, margin: f64, text: Color, quiet: Color, spotlight: f64 }
     Title {
         fill: Color, line: Color, text: Color, quiet: Color, added: Color, removed: Color, changed: Color,
         size: f64, quiet_size: f64, clock_size: f64, height: f64,
@@ -164,6 +164,9 @@ impl Style {
         let mut style: Self = keys
             .try_into()
             .map_err(|e: toml::de::Error| Error::bad_file(path, 0, e.message(), HINT))?;
+        let (background, part) = (style.background(), 1.0 - style.page.spotlight);
+        let pale: Vec<Color> = palette.iter().map(|c| c.faded(background, part)).collect();
+        palette.extend(pale);
         style.palette = palette.into_iter().collect();
         Ok(style)
     }

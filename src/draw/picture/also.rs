@@ -126,6 +126,11 @@ fn broken(words: &[String], fonts: &Fonts, size: f64, most: f64) -> Vec<Point> {
     words.iter().map(place).collect()
 }
 
+/// Whether these words name something that changed.
+pub(crate) fn is_news(words: &Group) -> bool {
+    words.data.iter().any(|(key, _)| *key == "entries")
+}
+
 impl Boxes<'_> {
     /// The introductory words and the names of a footer for drawings of all windows, each with its rectangle.
     pub(crate) fn footer_words(&self, footer: &Footer, place: Rect) -> Vec<(String, Rect)> {

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::arrows::Arrows;
+use super::spotlight::Spotlight;
 use super::{Picture, measured};
 use crate::draw::scene::{Group, Piece};
 use crate::graph::Id as _;
@@ -11,7 +12,11 @@ use crate::view::{ArrowId, SeenWindow};
 
 impl Picture<'_> {
     /// The lines of a window, and their labels; changed ones last, so that they are on top.
-    pub(super) fn lines(&self, seen: &SeenWindow) -> [Vec<Group>; 2] {
+    pub(super) fn lines(
+        &self,
+        seen: &SeenWindow,
+        spotlight: Option<&Spotlight<'_>>,
+    ) -> [Vec<Group>; 2] {
         let measured = &self.measured;
         let links = &measured.graph.plan.links;
         let look = |id: ArrowId| measured::find(&seen.arrows, id.at());
@@ -48,7 +53,11 @@ impl Picture<'_> {
         let mut groups = [Vec::new(), Vec::new()];
         for (arrow, path, shown, fork) in &drawn {
             let ends = [arrow.from, arrow.to].map(|id| measured::find(&seen.items, id.at()));
-            let (line, mut label) = arrows.parts(arrow, path, shown, ends);
+            let (mut line, mut label) = arrows.parts(arrow, path, shown, ends);
+            if let Some(spot) = spotlight.filter(|spot| !spot.has_line(arrow, shown)) {
+                spot.pale(&mut line);
+                spot.pale(&mut label);
+            }
             let named = fork.and_then(|fork| last.get(&fork)).map(|at| drawn[*at].1);
             if named.is_some_and(|other| {
                 !std::ptr::eq(other, *path) && other.label_area() == path.label_area()

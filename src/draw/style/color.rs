@@ -37,6 +37,13 @@ impl Color {
         Some(Self(Some([byte(0)?, byte(2)?, byte(4)?])))
     }
 
+    /// The mixture with `part` (0..=1) of a background; itself if one of them is none.
+    #[must_use]
+    pub(crate) fn faded(self, background: Self, part: f64) -> Self {
+        let both = self.0.and(background.0);
+        both.map_or(self, |_| self.towards(background, part))
+    }
+
     /// The mixture with `part` (0..=1) of `other`; if one of them is none, the nearer.
     #[must_use]
     pub fn towards(self, other: Self, part: f64) -> Self {
