@@ -1,9 +1,10 @@
-//! Figures for papers, exact in width and never with text below 6 pt: lifelines, graph and steps.
+//! Figures for papers, exact in width and never with text below 6 pt: lifelines, graph, holders and steps.
 //!
 //! A figure that does not fit with nodes is tried with groups; if that fails, the error suggests a filter.
 //! Text is never scaled.
 
 pub(crate) mod graph;
+pub(crate) mod holders;
 pub(crate) mod page;
 pub(crate) mod steps;
 mod tex;
@@ -22,6 +23,8 @@ worded! {
         Lives = "lives",
         /// The graph of the whole mission, with the times of each node.
         Graph = "graph",
+        /// Who sends each topic that changes hands or has several senders, and when nobody does.
+        Holders = "holders",
         /// A panel per change of phase, with only what changes and its direct partners.
         Steps = "steps",
     }

@@ -10,7 +10,7 @@ use crate::base::time::Stamp;
 use crate::base::words;
 use crate::draw::figure::page::{FigureSheet, nothing};
 use crate::draw::figure::steps::{StepPanel, graph_width};
-use crate::draw::figure::{self, Figure, FigureKind, graph, steps};
+use crate::draw::figure::{self, Figure, FigureKind, graph, holders, steps};
 use crate::draw::picture::PageOptions;
 use crate::draw::scene::Scene;
 use crate::draw::timeline::canvas::PX_PER_MM;
@@ -53,6 +53,7 @@ pub(super) fn draw(
     let (scene, remarks) = match options.kind {
         FigureKind::Lives => sheet.lives()?,
         FigureKind::Graph => of_graph(&sheet, drawing, watch)?,
+        FigureKind::Holders => (holders::page(&sheet)?, Vec::new()),
         FigureKind::Steps => (of_steps(&sheet, drawing)?, Vec::new()),
     };
     let drawn = figure::finished(&source, options, scene, remarks);

@@ -109,7 +109,7 @@ impl<'a> FigureSheet<'a> {
     }
 
     /// The number of rows that fit on a page with their notes.
-    fn most_rows(&self) -> usize {
+    pub(crate) fn most_rows(&self) -> usize {
         cast::to_usize((MOST_HEIGHT - 30.0) / self.sizes.pitch())
     }
 
@@ -125,14 +125,24 @@ impl<'a> FigureSheet<'a> {
                 format!("use `--width {enough}mm`"),
             );
         }
-        let high = timeline.height(self.sizes, self.sizes.pitch());
         let flag = if by_topics {
             "--topic-filter"
         } else {
             "--ns-filter"
         };
-        let hint = filter_that_fits(rows, self.most_rows(), flag, "row");
-        let rows = words::count(timeline.rows.len(), "row");
+        self.too_many(timeline, rows, (flag, "row"))
+    }
+
+    /// The error for too many of these rows, with a filter that leaves as many as fit.
+    pub(crate) fn too_many(
+        &self,
+        timeline: &Timeline,
+        rows: &[Row],
+        (flag, word): (&str, &str),
+    ) -> Error {
+        let high = timeline.height(self.sizes, self.sizes.pitch());
+        let hint = filter_that_fits(rows, self.most_rows(), flag, word);
+        let rows = words::count(timeline.rows.len(), word);
         Error::usage(
             format!("{rows} are {high:.0} mm high; a page has {MOST_HEIGHT} mm"),
             hint,

@@ -41,6 +41,7 @@ fn what(kind: FigureKind) -> &'static str {
     match kind {
         FigureKind::Lives => "When each element was running, how busy it was, and its changes.",
         FigureKind::Graph => "Publishers and subscribers, and the times at which they ran.",
+        FigureKind::Holders => "Senders of the topics that change hands or have several senders.",
         FigureKind::Steps => "The reconfigurations one by one: starts, stops and takeovers.",
     }
 }
@@ -53,6 +54,9 @@ fn legend(kind: FigureKind) -> &'static str {
         FigureKind::Graph => {
             "Bar in a box: when the node ran, from the start of the mission to its end; ticks: starts, ends and restarts; \
              lines: topics with their rates, dashed if inferred."
+        }
+        FigureKind::Holders => {
+            "Bars: the node that sends the topic; bars above each other: several at once; hatched: nobody."
         }
         FigureKind::Steps => {
             "Green with plus: starts; orange with minus: stops; purple: changes in another way; others: their direct partners."

@@ -57,7 +57,7 @@ impl Axis {
     }
 
     /// The rectangle of a time, from `y` on, wide enough to be seen.
-    fn rect(&self, time: Span, y: f64, height: f64) -> Rect {
+    pub(crate) fn rect(&self, time: Span, y: f64, height: f64) -> Rect {
         let left = self.x(time.start);
         Rect::new(left, y, (self.x(time.end) - left).max(0.25), height)
     }

@@ -6,8 +6,9 @@ use serde::Serialize;
 
 use crate::base::name::is_quiet;
 use crate::base::words;
-use crate::graph::{NodeId, TopicId};
+use crate::graph::{Element, NodeId, TopicId};
 use crate::mission::Mission;
+use crate::mission::event_log::Detail;
 use crate::mission::phases::knows_publishers;
 
 /// A figure that fits a mission.
@@ -22,7 +23,12 @@ pub struct FigureInfo {
 /// The figures that fit, best first: lifelines if elements start or stop, else the graph if edges are known.
 pub(crate) fn figures(mission: &Mission) -> Vec<FigureInfo> {
     let many = mission.log.phases.len();
-    let fitting = [lives(mission), graph(mission), steps(many)];
+    let fitting = [
+        lives(mission),
+        graph(mission),
+        holders(mission),
+        steps(many),
+    ];
     let mut all: Vec<FigureInfo> = fitting.into_iter().flatten().collect();
     if many <= 1 {
         all.sort_by_key(|f| f.figure != "graph");
@@ -77,6 +83,20 @@ fn graph(mission: &Mission) -> Option<FigureInfo> {
 fn ends(edges: &[crate::graph::Edge], is_shown: &dyn Fn(NodeId) -> bool) -> BTreeSet<TopicId> {
     let shown = edges.iter().filter(|e| is_shown(e.node));
     shown.map(|e| e.topic).collect()
+}
+
+fn holders(mission: &Mission) -> Option<FigureInfo> {
+    let events = mission.log.events.iter().filter(|event| !event.quiet);
+    let topics = events.filter_map(|event| match &event.detail {
+        Detail::Senders { from, to } if !from.is_empty() && !to.is_empty() => Some(event.what),
+        _ => None,
+    });
+    let topics: BTreeSet<Element> = topics.collect();
+    let many = words::count(topics.len(), "topic");
+    (!topics.is_empty()).then(|| FigureInfo {
+        figure: "holders",
+        shows: format!("who sends what, and when nobody does: {many} that change hands"),
+    })
 }
 
 fn steps(phases: usize) -> Option<FigureInfo> {
