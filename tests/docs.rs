@@ -223,7 +223,7 @@ fn gallery_shows_what_its_commands_draw() {
         Vec::<&str>::new(),
         "draw them anew with SNAPSHOTS=new"
     );
-    assert_eq!(shown, 19);
+    assert_eq!(shown, 20);
     let files = fs::read_dir(images).unwrap();
     let bytes: u64 = files
         .map(|file| file.unwrap().metadata().unwrap().len())
