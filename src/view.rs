@@ -29,6 +29,7 @@ use crate::graph::{ById, Element};
 use crate::mission::Mission;
 
 pub(crate) use filtered::filtered;
+pub(crate) use fold::namespaces::COMMON;
 pub use fold::namespaces::Collapsible;
 pub(crate) use fold::namespaces::headlines;
 pub use fold::rows::CardRow;

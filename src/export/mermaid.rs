@@ -120,6 +120,13 @@ fn colour(style: &Style, class: &str) -> String {
 /// The namespaces and items directly in a namespace. Namespaces nest at most 16 deep.
 fn members(view: &View, seen: &SeenWindow, out: &mut String, home: Option<usize>, depth: usize) {
     let indent = "  ".repeat(depth);
+    // Names in a subgraph are written as there.
+    let around = home.map_or("", |at| &*view.namespaces[at].name);
+    let relative = |name: &str| {
+        let inside = name.strip_prefix(around).filter(|_| home.is_some());
+        let inside = inside.and_then(|rest| rest.strip_prefix('/'));
+        escaped(inside.unwrap_or(name))
+    };
     for (at, space) in view
         .namespaces
         .iter()
@@ -129,7 +136,7 @@ fn members(view: &View, seen: &SeenWindow, out: &mut String, home: Option<usize>
         let mut inside = String::new();
         members(view, seen, &mut inside, Some(at), depth + 1);
         if !inside.is_empty() {
-            let name = escaped(&space.name);
+            let name = relative(&space.name);
             let _ = write!(
                 out,
                 "{indent}subgraph s{at}[\"{name}\"]\n{inside}{indent}end\n{indent}class s{at} space\n"
@@ -146,7 +153,7 @@ fn members(view: &View, seen: &SeenWindow, out: &mut String, home: Option<usize>
             ItemKind::Namespace | ItemKind::Group => ("[[", "]]"),
             ItemKind::Topic => ("[", "]"),
         };
-        let name = escaped(&item.name);
+        let name = relative(&item.name);
         let _ = writeln!(
             out,
             "{indent}i{}{open}\"{name}\"{close}:::{}",

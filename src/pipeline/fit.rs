@@ -1,6 +1,6 @@
 //! Makes a drawing legible: enlarges the page, draws topics as lines, collapses constant elements, then changing ones.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::compose::Composed;
@@ -14,7 +14,7 @@ use crate::draw::style::Style;
 use crate::graph::Element;
 use crate::layout::{Layout, LayoutOptions, Plan};
 use crate::mission::Mission;
-use crate::view::{Collapsible, ItemId, Mode, ViewOptions, headlines};
+use crate::view::{COMMON, Collapsible, ItemId, Mode, ViewOptions, headlines};
 
 /// The style used to decide what is drawn.
 const PLAIN: &str = "light";
@@ -313,7 +313,11 @@ impl Fitting<'_> {
             ..self.drawing.view.clone()
         };
         let nodes = self.mission.elements.nodes.iter();
-        let outermost: BTreeSet<&str> = nodes.filter_map(|n| outermost(n.name.as_str())).collect();
+        let names: Vec<&str> = nodes.map(|node| node.name.as_str()).collect();
+        let common = common_space(&names);
+        let outermost: BTreeSet<&str> = (names.iter().copied())
+            .filter_map(|name| outermost(name, common))
+            .collect();
         let is_open = |space: &&str| bundled.expand.iter().any(|open| &**open == *space);
         let outermost: Vec<&str> = outermost.into_iter().filter(|s| !is_open(s)).collect();
         bundled
@@ -384,10 +388,29 @@ impl Fitting<'_> {
     }
 }
 
-/// The first part of a name that has more than one: `/robot1` of `/robot1/nav/planner`.
-fn outermost(name: &str) -> Option<&str> {
-    let end = name.get(1..)?.find('/')? + 1;
+/// The first part of a name that has more than one: `/robot1` of `/robot1/nav/planner`; in a namespace that is common to
+/// all names, the first part below it.
+fn outermost<'n>(name: &'n str, common: &str) -> Option<&'n str> {
+    let start = if lies_in(name, common) {
+        common.len() + 1
+    } else {
+        1
+    };
+    let end = name.get(start..)?.find('/')? + start;
     name.get(..end)
+}
+
+/// The outermost namespace of nearly all of these names; empty if there is none.
+fn common_space<'n>(names: &[&'n str]) -> &'n str {
+    let mut spaces: BTreeMap<&str, usize> = BTreeMap::new();
+    for space in names.iter().filter_map(|name| outermost(name, "")) {
+        *spaces.entry(space).or_default() += 1;
+    }
+    let mut spaces = spaces.into_iter();
+    let most = names.len() * COMMON.0 / COMMON.1;
+    spaces
+        .find(|(_, many)| *many > most)
+        .map_or("", |(space, _)| space)
 }
 
 /// The layouts by one engine so far: collapsing or opening a namespace inside a collapsed one changes nothing.

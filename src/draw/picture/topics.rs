@@ -14,7 +14,7 @@ use crate::view::{Arrow, ItemId, Mark, Shown, TopicRow, View};
 
 /// The most topics that have a row each; if there are more, only those that changed, or the one with the
 /// highest rate.
-const MOST: usize = 3;
+const MOST: usize = 4;
 /// The number of letters above which a rate is drawn below its name, so that lines need not be long.
 const LONGEST: usize = 15;
 /// The largest width of a name, in text heights.
@@ -116,7 +116,7 @@ fn relative<'a>(view: &View, arrow: &Arrow, name: &'a str) -> &'a str {
     shorter.min_by_key(|rest| rest.len()).unwrap_or(name)
 }
 
-/// The rows of a line in a window: up to three topics have one each, changed ones first, then by rate; of
+/// The rows of a line in a window: up to four topics have one each, changed ones first, then by rate; of
 /// more, the changed ones or the one with the highest rate, with the number of the others.
 pub(crate) fn rows(shown: &Shown, names: &[String]) -> Vec<Row> {
     let both = uses(shown) == [true, true];
@@ -239,9 +239,10 @@ mod tests {
     }
 
     #[test]
-    fn of_four_topics_the_fastest_is_named() {
+    fn of_five_topics_the_fastest_is_named() {
         let four = "/a>/p@1 /a>/q@2 /a>/r@3 /a>/s@4 /b</p /b</q /b</r /b</s";
-        assert_eq!(words(four), ["s 4 Hz +3"]);
+        assert_eq!(words(four), ["s 4 Hz", "r 3 Hz", "q 2 Hz", "p 1 msg"]);
+        assert_eq!(words(&format!("{four} /a>/t@5 /b</t")), ["t 5 Hz +4"]);
     }
 
     #[test]

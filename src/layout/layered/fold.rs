@@ -4,6 +4,9 @@
 use super::rank::neighbours;
 use crate::base::cast;
 
+/// The leaves of a hub that are seen at a glance in one layer.
+const FEWEST_IN_LAYER: usize = 6;
+
 /// Ranks with at least `layers` layers and the sources spread evenly over them; `None` if there is nothing to spread.
 ///
 /// A source is a vertex without predecessors; it may move as far back as its longest path allows. `home` is
@@ -37,12 +40,22 @@ pub(crate) fn fold(
         load[at + 1] += leaves;
         folded[source] = at;
     }
+    let first = |folded: &[usize], v: usize| {
+        let before = graph.before[v].iter().map(|&u| folded[u] + 1);
+        before.max().unwrap_or(0)
+    };
     for &v in graph.order.iter().filter(|&&v| !graph.is_source(v)) {
-        folded[v] = graph.before[v]
-            .iter()
-            .map(|&u| folded[u] + 1)
-            .max()
-            .unwrap_or(0);
+        folded[v] = first(&folded, v);
+    }
+    // The leaves of a hub stand in several layers, as full as the others.
+    let most = rank.len().div_ceil(layers - 1).max(FEWEST_IN_LAYER);
+    let is_crowded = |v: &usize| graph.leaves(graph.before[*v][0]) > most;
+    let leaves = (0..rank.len()).filter(|&v| graph.is_leaf(v));
+    let mut filled = vec![0; layers];
+    for v in leaves.filter(is_crowded) {
+        let layer = (folded[v]..layers).find(|layer| filled[*layer] < most);
+        folded[v] = layer.unwrap_or(folded[v]);
+        filled[folded[v]] += 1;
     }
     Some(squeezed(&folded))
 }
@@ -143,6 +156,21 @@ mod tests {
                 .iter()
                 .zip(&folded[12..24])
                 .all(|(node, topic)| node + 1 == *topic)
+        );
+    }
+
+    #[test]
+    fn leaves_of_a_hub_stand_in_several_layers() {
+        let rank: Vec<usize> = (0..41).map(|v| usize::from(v > 0)).collect();
+        let edges: Vec<(usize, usize)> = (1..41).map(|leaf| (0, leaf)).collect();
+        let folded = fold(&rank, &edges, &[0; 41], 6).unwrap();
+        let count = |layer: usize| folded.iter().filter(|f| **f == layer).count();
+        let counts: Vec<usize> = (0..6).map(count).collect();
+        assert_eq!(counts, [1, 9, 9, 9, 9, 4]);
+        // Six are seen at a glance.
+        assert_eq!(
+            fold(&rank[..7], &edges[..6], &[0; 7], 6).unwrap(),
+            rank[..7]
         );
     }
 

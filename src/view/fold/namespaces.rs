@@ -101,6 +101,10 @@ pub(crate) fn sent_from<'a>(
     first.filter(|_| publishers.all(|other| other == first))
 }
 
+/// The share of the boxes above which a namespace is common to all of them: `/fleet` around forty robots. Collapsed, it
+/// would be all that is drawn.
+pub(crate) const COMMON: (usize, usize) = (9, 10);
+
 /// A namespace that could be collapsed to one box.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Collapsible {
@@ -147,7 +151,7 @@ impl View {
 
     /// The namespaces that could be collapsed, in the order of collapsing: those with fewest changes per box,
     /// then inner before outer ones, larger before smaller ones, then by name. Those with fewer than two
-    /// boxes, or that `options` keeps open, are omitted.
+    /// boxes, or with nearly all, or that `options` keeps open, are omitted.
     pub fn collapsible(&self, mission: &Mission, options: &ViewOptions) -> Vec<Collapsible> {
         let changed = changed(mission);
         let open = Collapse::new(options).expand;
@@ -163,7 +167,8 @@ impl View {
                 space = namespace(space);
             }
         }
-        sizes.retain(|space, size| *size > 1 && !open.contains(space));
+        let most = self.items.len() * COMMON.0 / COMMON.1;
+        sizes.retain(|space, size| *size > 1 && *size <= most && !open.contains(space));
         let inner = |space: &str| {
             let below = format!("{space}/");
             let mut after = sizes.range(below.as_str()..);
