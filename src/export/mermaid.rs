@@ -199,8 +199,8 @@ mod tests {
         let want = [
             "flowchart LR",
             "  subgraph s0[\"/n\"]",
-            "    i1([\"/n/a\"]):::node",
-            "    i2[\"/n/t\"]:::topic",
+            "    i1([\"a\"]):::node",
+            "    i2[\"t\"]:::topic",
             "  end",
             "  class s0 space",
             "  i0([\"/b#34;\"]):::node",
