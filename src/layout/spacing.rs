@@ -6,8 +6,7 @@ use std::collections::BTreeMap;
 
 use crate::base::geometry::{Point, Rect, Size};
 use crate::layout::{
-    Component, LayerItem, LayerRows, Layers, LayoutOptions, Link, Orientation, Plan, first_bend,
-    include,
+    LayerItem, LayerRows, Layers, Link, Orientation, PartTask, Plan, first_bend, include,
 };
 
 /// The space between boxes side by side, between edges side by side, and between an edge and anything else.
@@ -68,13 +67,13 @@ pub(crate) struct Spacing<'a> {
 }
 
 impl<'a> Spacing<'a> {
-    pub(crate) fn new(
-        plan: &Plan,
-        options: &LayoutOptions,
-        part: &Component,
-        layers: &'a Layers,
-        orientation: Orientation,
-    ) -> Self {
+    pub(crate) fn new(task: PartTask<'_>, layers: &'a Layers) -> Self {
+        let PartTask {
+            plan,
+            part,
+            orientation,
+            ..
+        } = task;
         let mut loops = vec![0; part.vertices.len()];
         for &(from, _) in part.ends.iter().filter(|(from, to)| from == to) {
             loops[from] += 1;
@@ -109,7 +108,7 @@ impl<'a> Spacing<'a> {
             loops,
             label,
             worded,
-            below_title: if options.is_tight { 0.0 } else { HEAD },
+            below_title: if task.options.is_tight { 0.0 } else { HEAD },
             footer: std::iter::once((0.0, 0.0))
                 .chain(part.clusters.iter().map(footer))
                 .collect(),
