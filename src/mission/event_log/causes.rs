@@ -220,7 +220,7 @@ fn flaps(drafts: &mut Drafts) {
         }
         let until = drafts.get(*last).time;
         let event = &mut drafts.list[*first];
-        event.detail = Detail::Count(many as u64);
+        event.detail = Detail::Count { count: many as u64 };
         event.until = Some(until);
         for id in rest.iter().chain([last]) {
             drafts.fold(*id, *first);
