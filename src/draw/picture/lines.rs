@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::arrows::Arrows;
 use super::{Picture, measured};
 use crate::draw::scene::{Group, Piece};
 use crate::graph::Id as _;
@@ -40,15 +39,11 @@ impl Picture<'_> {
         for (k, (.., fork)) in drawn.iter().enumerate() {
             last.extend(fork.map(|fork| (fork, k)));
         }
-        let arrows = Arrows {
-            style: measured.style,
-            fonts: measured.fonts,
-            fit: self.fit,
-        };
+        let pen = self.pen();
         let mut groups = [Vec::new(), Vec::new()];
         for (arrow, path, shown, fork) in &drawn {
             let ends = [arrow.from, arrow.to].map(|id| measured::find(&seen.items, id.at()));
-            let (line, mut label) = arrows.parts(arrow, path, shown, ends);
+            let (line, mut label) = pen.arrow_parts(arrow, path, shown, ends);
             let named = fork.and_then(|fork| last.get(&fork)).map(|at| drawn[*at].1);
             if named.is_some_and(|other| {
                 !std::ptr::eq(other, *path) && other.label_area() == path.label_area()

@@ -3,6 +3,7 @@
 use super::PageOptions;
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::style::Style;
+use crate::draw::text::Fonts;
 use crate::draw::timeline::below::BelowSizes;
 
 /// The page size for which lengths of title, legend and timeline are given.
@@ -43,6 +44,13 @@ pub(crate) struct GraphFit {
     /// The scale of strokes and badges: they shrink less than the elements that they surround, to stay visible.
     pub(crate) pen: f64,
     pub(crate) origin: Point,
+}
+
+/// The style, the fonts and the scale that the graph is drawn with.
+pub(crate) struct GraphPen<'a> {
+    pub(crate) style: &'a Style,
+    pub(crate) fonts: &'a Fonts,
+    pub(crate) fit: GraphFit,
 }
 
 impl PageFrame {

@@ -166,8 +166,8 @@ fn apart(p: Point, a: Point, b: Point) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::draw::picture::measured::{Label, ShownRates};
     use crate::draw::picture::page::GraphFit;
+    use crate::draw::picture::texts::{Label, ShownRates};
     use crate::layout::Route;
 
     fn line(from: Point, to: Point) -> ArrowPath {

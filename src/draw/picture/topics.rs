@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use super::measured::LINE;
-use super::texts;
+use super::texts::{self, LINE};
 use crate::base::geometry::Size;
 use crate::base::words;
 use crate::draw::style::Edge;
