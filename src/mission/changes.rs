@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use super::Window;
 use super::event_log::{Detail, Event, EventId, EventLog, Kind, sorted_by};
+use crate::base::ids::grouped;
 use crate::base::time::{Span, Stamp};
 use crate::graph::diff::{Diff, diff};
 use crate::graph::history::Bound;
@@ -233,10 +234,8 @@ fn change(event: &Event) -> Option<Change> {
 /// The ids of the events that explain the windows' changes, in a log that was made from them: for each change, the
 /// nearest in time with the same kind and element.
 pub(crate) fn places(log: &EventLog, windows: &[Window]) -> Vec<Vec<EventId>> {
-    let mut of: BTreeMap<(Kind, Element), Vec<EventId>> = BTreeMap::new();
-    for (id, event) in log.events.with_ids() {
-        of.entry((event.kind, event.what)).or_default().push(id);
-    }
+    let events = log.events.with_ids();
+    let of = grouped(events.map(|(id, event)| ((event.kind, event.what), id)));
     let time = |id: EventId| log.events[id].time;
     let place = |change: &Change, start: Stamp| {
         let all = of.get(&(change.kind, change.what))?;

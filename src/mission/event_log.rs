@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use crate::base::ids::ids;
+use crate::base::ids::{grouped, ids};
 use crate::base::rhythm::{CLOSE_NS, SWITCH, SWITCH_NS};
 use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
@@ -351,13 +351,8 @@ impl EventLog {
 
     /// The ids of the parts of all events, in order, by the ids of those events.
     pub fn all_parts(&self) -> Parts {
-        let mut parts = Parts::new();
-        for (id, event) in self.events.with_ids() {
-            if let Some(whole) = event.part_of {
-                parts.entry(whole).or_default().push(id);
-            }
-        }
-        parts
+        let events = self.events.with_ids();
+        grouped(events.filter_map(|(id, event)| Some((event.part_of?, id))))
     }
 
     /// The parts of an event, in order.

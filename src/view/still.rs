@@ -11,11 +11,12 @@ use super::{
     Arrow, ArrowKind, Counts, Frame, Item, ItemId, Looks, Mark, Phrase, SeenWindow, Shown,
     TopicRow, View, sum as added,
 };
+use crate::base::ids::grouped;
 use crate::base::time::Span;
 use crate::base::words;
 use crate::graph::history::Sender;
 use crate::graph::{ById, Element};
-use crate::mission::event_log::Kind;
+use crate::mission::event_log::{Event, Kind};
 use crate::mission::rates::{Rates, mean, same};
 use crate::mission::{EventId, Mission};
 
@@ -234,19 +235,18 @@ type NodeMarks = BTreeMap<Element, Vec<(EventId, f64, Mark)>>;
 
 /// The starts, ends and restarts of each node in the log, in its order.
 fn marks(mission: &Mission) -> NodeMarks {
-    let mut marks = NodeMarks::new();
-    let events = mission.log.events.with_ids();
-    for (id, event) in events.filter(|(_, event)| event.is_headline() && event.what.is_node()) {
+    let mark = |(id, event): (EventId, &Event)| {
         let mark = match event.kind {
             Kind::Started => Mark::Added,
             Kind::Stopped => Mark::Removed,
             Kind::Restarted => Mark::Restarted,
-            _ => continue,
+            _ => return None,
         };
-        let own = marks.entry(event.what).or_default();
-        own.push((id, mission.span.part(event.time), mark));
-    }
-    marks
+        Some((event.what, (id, mission.span.part(event.time), mark)))
+    };
+    let events = mission.log.events.with_ids();
+    let events = events.filter(|(_, event)| event.is_headline() && event.what.is_node());
+    grouped(events.filter_map(mark))
 }
 
 /// The times of the nodes in a box; none for a box of topics.

@@ -8,6 +8,7 @@ use super::arrows::ArrowPath;
 use super::page::GraphFit;
 use super::topics;
 use crate::base::geometry::Size;
+use crate::base::ids::grouped;
 use crate::draw::style::Edge;
 use crate::draw::text::Fonts;
 use crate::graph::{ById, Id as _};
@@ -30,16 +31,12 @@ pub(crate) struct Gate {
 
 /// The gates of a view. Lines to topics, which are drawn as boxes, have none.
 pub(crate) fn gates(view: &View) -> Vec<Gate> {
-    let mut found: BTreeMap<(usize, ItemId), Vec<(ArrowId, bool)>> = BTreeMap::new();
-    for (at, arrow) in view.arrows.with_ids() {
-        if let Some((space, is_outward)) =
-            crossed(view, arrow).filter(|_| is_between_nodes(view, arrow))
-        {
-            let outside = if is_outward { arrow.to } else { arrow.from };
-            let members = found.entry((space, outside)).or_default();
-            members.push((at, is_outward));
-        }
-    }
+    let crossing = |(at, arrow): (ArrowId, &Arrow)| {
+        let (space, is_outward) = crossed(view, arrow)?;
+        let outside = if is_outward { arrow.to } else { arrow.from };
+        is_between_nodes(view, arrow).then_some(((space, outside), (at, is_outward)))
+    };
+    let found = grouped(view.arrows.with_ids().filter_map(crossing));
     let found = found.into_iter().filter(|(_, members)| members.len() > 1);
     let gate = |((space, _), members): (_, Vec<(ArrowId, bool)>)| {
         let quiet = |at: ArrowId| {

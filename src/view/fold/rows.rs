@@ -4,9 +4,10 @@
 //! `/battery`, which only `/driver` publishes and nobody reads, is the row `→ /battery` of `/driver`; `/tf` is a row of each
 //! of the six nodes that use it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use crate::base::ids::grouped;
 use crate::base::name::{is_unnamed, namespace};
 use crate::graph::ById;
 use crate::mission::EventId;
@@ -48,11 +49,8 @@ impl View {
         let mut items_stay = ById::like(&self.items, true);
         let mut arrows_stay = ById::like(&self.arrows, true);
         for (topic, lines) in lines.with_ids().filter(|(_, lines)| !lines.is_empty()) {
-            let mut owners: BTreeMap<ItemId, Vec<ArrowId>> = BTreeMap::new();
-            for at in lines {
-                let end = self.topic_end(&self.arrows[*at]).map(|(_, owner)| owner);
-                owners.entry(end.unwrap_or(topic)).or_default().push(*at);
-            }
+            let owner = |at: ArrowId| self.topic_end(&self.arrows[at]).map_or(topic, |end| end.1);
+            let owners = grouped(lines.iter().map(|at| (owner(*at), *at)));
             let is_infrastructure = hides_infrastructure
                 && is_infrastructure(&self.items[topic].name)
                 || self.is_hub(owners.keys());
