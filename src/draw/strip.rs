@@ -31,7 +31,8 @@ const ENLARGED: f64 = 1.2;
 const NARROWEST: f64 = 480.0;
 /// Shapes of panels that are tried on paper: height over width.
 pub(crate) const SHAPES: [f64; 4] = [0.4, 0.6, 1.0, 1.6];
-/// The largest height of a strip over its width, if there is a choice.
+/// The largest height of a strip over its width, if there is a choice: a page of A4, 1.4 times as high as
+/// wide, has room for its caption.
 const HIGHEST: f64 = 1.3;
 
 /// A strip and remarks for the user.

@@ -27,12 +27,12 @@ use crate::base::error::Result;
 use crate::base::geometry::{Point, Rect, Size};
 use order::{LayerOrder, Search};
 
-/// The space between parts.
+/// The space between parts: more than between boxes, so that parts are seen as such.
 const PART_GAP: f64 = 20.0;
 /// The most parts of which small ones are placed in the gaps of others.
 const MOST_NESTED: usize = 24;
 /// The largest number of edges of a part that is cut in several ways; a larger one is cut only in the way that keeps it
-/// small.
+/// small. Each way is a whole layout.
 const MANY: usize = 300;
 /// The largest number of items in layers that are laid out.
 const MOST: usize = 150_000;

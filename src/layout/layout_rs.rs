@@ -30,7 +30,7 @@ use crate::base::geometry::{Rect, Size};
 const MOST: usize = 150;
 /// The number of edges that the search for a good order may sweep, per part.
 const EFFORT: usize = 20_000;
-/// The space around boxes, and around edges: along, across.
+/// The space around boxes, and around edges: along, for labels and heads, and across.
 const BOX_HALO: Size = Size::new(50.0, 14.0);
 const EDGE_HALO: Size = Size::new(10.0, 7.0);
 

@@ -6,7 +6,7 @@ pub(crate) mod around;
 use super::{LayerItem, Layers, Outline, Route};
 use crate::base::geometry::{Point, Size};
 
-/// The distance of neighbouring ports, if the side of a box is long enough.
+/// The distance of neighbouring ports, if the side of a box is long enough: closer, the heads of arrows overlap.
 const PORT_STEP: f64 = 6.0;
 
 /// The input of a router, with x along and y across: the placed vertices and the layers' extents.

@@ -9,22 +9,24 @@ use crate::layout::{
     LayerItem, LayerRows, Layers, Link, Orientation, PartTask, Plan, first_bend, include,
 };
 
-/// The space between boxes side by side, between edges side by side, and between an edge and anything else.
+/// The space between boxes side by side, and between edges side by side and an edge and anything else: the heads
+/// of two arrows side by side are 6 pixels wide and must not touch.
 const BOX_GAP: f64 = 12.0;
 const EDGE_GAP: f64 = 7.0;
-/// The space between a cluster's border and its contents, and outside of it.
+/// The space between a cluster's border and its contents, and outside of it: as between edges, one of which may
+/// run along it.
 pub(crate) const PADDING: f64 = 7.0;
 /// The space below a title for the heads of arrows from above: the title is painted over their lines.
 const HEAD: f64 = 9.0;
 const MARGIN: f64 = 4.0;
-/// The space before and after a label between two layers.
+/// The space before and after a label between two layers: its edge is seen on both sides.
 const LABEL_GAP: f64 = 12.0;
 /// The space that the first self loop takes beside its vertex, and each further one.
 const LOOP: (f64, f64) = (14.0, 6.0);
 
 /// The space between a label and its edge.
 const ASIDE: f64 = 4.0;
-/// The space that edges need to bend twice, as a fraction of the space to bend once.
+/// The space that edges need to bend twice, as a fraction of the space to bend once: the bends are half as far across.
 const TWICE: f64 = 0.45;
 
 /// The bend beside which the label of an edge is placed: about the middle one, in a layer without boxes; for

@@ -23,7 +23,7 @@ const FONT: f64 = 11.0;
 const SLACK: f64 = 1.15;
 /// The height of nodes and topics, Graphviz's half inch.
 const HEIGHT: f64 = 36.0;
-/// The height of a line of text.
+/// The height of a line of text of that font, in points.
 const LINE: f64 = 15.0;
 
 /// A view with the parts that all its DOT files share: unique ids and one layout.

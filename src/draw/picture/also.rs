@@ -13,11 +13,11 @@ use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::view::{AlsoHere, Item, Mark, Shown, View};
 
-/// The width at which the words are wrapped unless their namespace is wider, in text heights.
+/// The width at which the words are wrapped unless their namespace is wider, in text heights: two names of usual length.
 const WIDTH: f64 = 22.0;
-/// The space above the words, in text heights.
+/// The space above the words, in text heights: they must not look like names of the boxes above.
 const ABOVE: f64 = 0.4;
-/// The distance of the words from the frame of their namespace, in pixels.
+/// The distance of the words from the frame of their namespace, in pixels: that of its title.
 const INSET: f64 = 8.0;
 const FIRST: &str = "also here:";
 /// The most names that are listed: ten lines or so. The others are counted.

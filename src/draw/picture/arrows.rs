@@ -12,11 +12,12 @@ use crate::draw::text::Weight;
 use crate::layout::Route;
 use crate::view::{Arrow, ArrowKind, Mark, Shown};
 
-/// The number of straight pieces in which a curve is measured, and of those in which its exit from a frame is
-/// searched.
+/// The number of straight pieces in which a curve is measured: with ten, its length is exact to a hundredth.
 const PIECES: u32 = 10;
+/// The number of those in which its exit from a frame is searched: fine enough
+/// for the head of an arrow to end on the frame.
 const EXIT: u32 = 64;
-/// The largest distance of a label from its line in pixels.
+/// The largest distance of a label from its line in pixels, a line of text: one further away needs a line to it.
 const NEAR: f64 = 12.0;
 
 /// The positions of the parts of one arrow on the page, equal in every frame.
@@ -100,6 +101,7 @@ impl ArrowPath {
             Rect::around(fit.point(label), room)
         });
         let label = area.map(|area| LabelPlace::new(area, &points));
+        // A badge without its halo, and parts of the line, its middle first; the ends are for heads.
         let badge = Size::new(12.0, 12.0);
         let covers = |p: &Point| area.is_some_and(|area| area.overlaps(&Rect::around(*p, badge)));
         let mut spots = [0.5, 0.4, 0.6, 0.3, 0.7, 0.22, 0.78]

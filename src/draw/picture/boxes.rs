@@ -14,7 +14,7 @@ use crate::draw::text::Weight;
 use crate::graph::State;
 use crate::view::{Item, ItemKind, Shown};
 
-/// The dashes of an empty namespace.
+/// The dashes of an empty namespace: dots, as dashes stand for what is inferred.
 const EMPTY: [f64; 2] = [1.0, 4.0];
 
 /// The parts of an item that are equal in every window.

@@ -16,16 +16,18 @@ use crate::draw::text::{Fonts, Weight};
 use crate::graph::{Id as _, State};
 use crate::view::{CardRow, Mark, Shown, View};
 
-/// The height of a row, relative to the size of its text.
+/// The height of a row, relative to the size of its text: a badge and the frame of a change
+/// fit into it.
 const STEP: f64 = 1.5;
 /// The space before and after the words of a row, and between a name and its rate, relative to the size of
-/// the text.
+/// the text: a letter's width is half a height, and the gap must be more than one between words.
 const PAD: f64 = 1.1;
-/// The most names in a row of topics without messages.
+/// The most names in a row of topics without messages: a row of more would be the widest of its box.
 const MOST_SILENT: usize = 3;
-/// The most rows of a box of which few are listed; of more, the last counts those that are not.
+/// The most rows of a box of which few are listed, as many as a line between boxes has; of more, the last counts those that
+/// are not.
 const MOST_ROWS: usize = 3;
-/// The size of a badge in a row, relative to that on a box.
+/// The size of a badge in a row, relative to that on a box: it fits into the height of the row.
 const BADGE: f64 = 0.7;
 
 /// The rows of a box.

@@ -98,7 +98,8 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
         .collect()
 }
 
-/// The width of a sign, before its words.
+/// The widths of a sign (an arrow with its head, or a box that is not a square), of the space before its words, and of the
+/// space after them: twice that before, so that words belong to the sign on their left.
 const SIGN: f64 = 24.0;
 const GAP: f64 = 6.0;
 const AFTER: f64 = 14.0;

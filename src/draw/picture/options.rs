@@ -116,7 +116,9 @@ pub(crate) fn of_arrow(
     }
     if let Some(mark) = shown.mark {
         let change = change(style, mark);
+        // The style's width is that of a box; a line between boxes is noticed with two thirds of it.
         let width = match mark {
+            // A full line in this color would stand out more than one that is there.
             Mark::Removed => change.width * 0.8,
             // As wide as its rate requires, but never narrower than a visible change.
             _ => (change.width * 0.65).max(width_of(style, flow)),

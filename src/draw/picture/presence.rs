@@ -39,6 +39,7 @@ impl GraphPen<'_> {
         );
         group.shape(Shape::filled(Form::Rect(bar, 0.0), style.timeline.future));
         for (from, to) in &presence.times {
+            // At least half a pixel, or a short presence is not seen.
             let wide = ((to - from) * bar.w).max(0.5 * scale);
             let part = Rect::new(bar.x + from * bar.w, bar.y, wide, bar.h);
             group.shape(Shape::filled(Form::Rect(part, 0.0), body.stroke));

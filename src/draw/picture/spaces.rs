@@ -81,12 +81,15 @@ pub(crate) fn badges(space: &Space, fonts: &Fonts, size: f64) -> Vec<(f64, f64)>
     space.replicas.iter().map(badge).collect()
 }
 
-/// The largest number of equal namespaces with a badge each; more are only counted.
+/// The largest number of equal namespaces with a badge each; more, which would be wider than most namespaces,
+/// are only counted.
 const MOST_BADGES: usize = 32;
-/// The font size of a badge, relative to that of the title.
+/// The font size of a badge, relative to that of the title: with its frame it is as high as the title's
+/// line.
 const BADGE_TEXT: f64 = 0.8;
 
-/// The width of the line of their number over time, relative to the font size of the title.
+/// The width of the line of their number over time, relative to the font size of the title: as wide as a name of usual
+/// length, so that it does not widen the namespace.
 const COURSE: f64 = 6.0;
 
 /// The left edge and the width of the line of their number over time, relative to the title; `None` if it

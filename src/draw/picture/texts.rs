@@ -122,12 +122,14 @@ pub(crate) fn facts(shown: &Shown) -> String {
 
 // The words of boxes and arrows.
 
-/// The height of a line of text, relative to its font size.
+/// The height of a line of text, relative to its font size: from ascender to descender of the font.
 pub(crate) const LINE: f64 = 1.22;
-/// The height of a rate label, and its width beyond its text, relative to the font size.
+/// The height of a rate label, and its width beyond its text, relative to the font size: its ends are half circles, which
+/// letters must not touch.
 pub(crate) const BADGE_HEIGHT: f64 = 1.5;
 pub(crate) const BADGE_PAD: f64 = 1.2;
-/// The least relative difference of a subscription's rate from its topic's for it to be written beside it.
+/// The least relative difference of a subscription's rate from its topic's for it to be written beside it: less is a
+/// message more or less in a window.
 const OWN_RATE: f64 = 0.15;
 /// The height of the bar of the times at which a node was there, as a share of that of its name: half a stroke of a letter
 /// thicker than a line, so that it is not taken for one.

@@ -11,7 +11,8 @@ use crate::layout::{
     Component, Layers, Layout, LayoutOptions, Orientation, PartTask, Plan, Route, pack,
 };
 
-/// The aspect, along by across, beyond which a part that does not fit the page is long.
+/// The aspect, along by across, beyond which a part that does not fit the page is long: in two rows, one of less is
+/// higher than it is wide.
 const LONG: f64 = 2.5;
 /// The most rows.
 const MOST_ROWS: usize = 12;
@@ -19,7 +20,8 @@ const MOST_ROWS: usize = 12;
 const MOST_CUT: usize = 8;
 /// The scale of a sketch divided by that of the drawing with all effort, at least: true of 165 of 169 synthetic parts.
 const SKETCHED: f64 = 0.9;
-/// The space beside an edge in a channel, and between a channel and the boxes.
+/// The space beside an edge in a channel, and between a channel and the boxes: the length of an arrow's head, and
+/// half as much again.
 const LANE: f64 = 8.0;
 const BESIDE: f64 = 12.0;
 
