@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::steady::Lengths;
 use super::{
-    Arrow, ArrowKind, Counts, Frame, Item, ItemId, Looks, Mark, Phrase, SeenWindow, Shown,
+    Arrow, ArrowKind, Counts, Frame, Item, ItemId, Mark, Phrase, SeenWindow, Shown, ShownRuns,
     TopicRow, View, sum as added,
 };
 use crate::base::ids::grouped;
@@ -41,7 +41,7 @@ pub(super) fn still(mut view: View, mission: &Mission) -> View {
                 rates.of_topics(&row.item.members, shown)
             }
         });
-        row.shown = Looks::of([shown.as_ref()]);
+        row.shown = ShownRuns::of([shown.as_ref()]);
     }
     let also = view.also.iter_mut();
     let also = also.flat_map(|also| also.items.iter().zip(&mut also.shown));
@@ -53,12 +53,12 @@ pub(super) fn still(mut view: View, mission: &Mission) -> View {
     {
         let shown = whole(looks, &lengths);
         let shown = shown.map(|shown| rates.of_topics(&item.members, shown));
-        *looks = Looks::of([shown.as_ref()]);
+        *looks = ShownRuns::of([shown.as_ref()]);
     }
     for (arrow, looks) in view.arrows.iter().zip(view.arrows_shown.iter_mut()) {
         let shown = whole(looks, &lengths);
         let shown = shown.map(|shown| rates.of_line(arrow, shown));
-        *looks = Looks::of([shown.as_ref()]);
+        *looks = ShownRuns::of([shown.as_ref()]);
     }
     let marks = marks(mission);
     let items = view.items.iter();
@@ -90,7 +90,7 @@ pub(super) fn still(mut view: View, mission: &Mission) -> View {
 pub(crate) fn union(view: &View) -> Option<SeenWindow> {
     view.frames.first()?;
     let lengths = Lengths::new(view.frames.iter().map(|f| f.span));
-    let all = |shown: &[Looks]| {
+    let all = |shown: &[ShownRuns]| {
         let whole = shown.iter().filter_map(|looks| whole(looks, &lengths));
         whole.collect()
     };
@@ -156,7 +156,7 @@ impl StillRates<'_> {
 }
 
 /// The look of one item or arrow in all windows together.
-fn whole(looks: &Looks, lengths: &Lengths) -> Option<Shown> {
+fn whole(looks: &ShownRuns, lengths: &Lengths) -> Option<Shown> {
     let mut slot = None;
     let (mut first, mut last) = (None, 0);
     for (from, to, _, shown) in looks.spans(lengths.windows()) {

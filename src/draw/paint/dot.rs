@@ -15,7 +15,7 @@ use crate::evidence::Evidence;
 use crate::graph::{ById, Element, Elements, Id as _, State};
 use crate::layout::{self, Layout, Link, Orientation, Outline, Plan, Vertex};
 use crate::mission::Mission;
-use crate::view::{Arrow, ItemKind, Looks, Mark, Shown, View};
+use crate::view::{Arrow, ItemKind, Mark, Shown, ShownRuns, View};
 
 /// The font size of `qt_dotgraph`, in points; one point is one pixel of ours.
 const FONT: f64 = 11.0;
@@ -125,7 +125,7 @@ fn plan(view: &View, fonts: &Fonts) -> Plan {
         }
     });
     let mut widest = ById::like(&view.arrows, None::<f64>);
-    for shown in view.arrows_shown.iter().flat_map(Looks::distinct) {
+    for shown in view.arrows_shown.iter().flat_map(ShownRuns::distinct) {
         let arrow = view.arrows.get(shown.arrow());
         let label = arrow.and_then(|arrow| label(arrow, shown));
         if let (Some(label), Some(most)) = (label, widest.get_mut(shown.arrow())) {

@@ -14,7 +14,7 @@ use crate::draw::scene::{Anchor, Font, Form, Group, Shape, Step, Text};
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::graph::{Id as _, State};
-use crate::view::{CardRow, Mark, Shown, View};
+use crate::view::{BoxRow, Mark, Shown, View};
 
 /// The height of a row, relative to the size of its text: a badge and the frame of a change
 /// fit into it.
@@ -122,19 +122,19 @@ impl Card {
 }
 
 /// Whether there is an event about a topic or its connection.
-fn is_changing(row: &CardRow) -> bool {
+fn is_changing(row: &BoxRow) -> bool {
     row.shown.distinct().iter().any(|look| look.mark.is_some())
 }
 
 /// Whether a topic has no events and either never carries a message or is a hub.
-fn is_quiet(row: &CardRow) -> bool {
+fn is_quiet(row: &BoxRow) -> bool {
     let is_silent = |look: &Shown| look.state != State::Latched && look.hz.unwrap_or(0.0) <= 0.0;
     let mut looks = row.shown.distinct().iter();
     !is_changing(row) && looks.all(|look| is_silent(look) || row.is_infrastructure)
 }
 
 /// The name of a topic as drawn: relative to the namespace of the node.
-fn name(view: &View, row: &CardRow, fonts: &Fonts, size: f64) -> String {
+fn name(view: &View, row: &BoxRow, fonts: &Fonts, size: f64) -> String {
     let inside = namespace(&view.items[row.owner].name).trim_end_matches('/');
     let name = fitted(short_name(&row.item.label, inside), fonts, size);
     if row.item.is_service {
@@ -225,7 +225,7 @@ impl GraphPen<'_> {
             let row = &view.rows[*at];
             Some((row, view.seen_at(&row.shown, k)?))
         });
-        let seen: Vec<(&CardRow, Shown)> = seen.collect();
+        let seen: Vec<(&BoxRow, Shown)> = seen.collect();
         let (row, shown) = seen.first()?;
         let id = format!("{owner}..{}", item_id(&row.item));
         let mut group = Group::new(id, class(row.item.class(), shown))

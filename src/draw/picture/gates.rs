@@ -13,7 +13,7 @@ use crate::draw::style::Edge;
 use crate::draw::text::Fonts;
 use crate::graph::{ById, Id as _};
 use crate::layout::Layout;
-use crate::view::{Arrow, ArrowId, ArrowKind, ItemId, Looks, Shown, TopicRow, View};
+use crate::view::{Arrow, ArrowId, ArrowKind, ItemId, Shown, ShownRuns, TopicRow, View};
 
 /// The lines between the boxes of a namespace and one box outside of it, drawn as one while they are
 /// unchanged.
@@ -63,7 +63,7 @@ pub(crate) fn gates(view: &View) -> Vec<Gate> {
 }
 
 /// The number of windows in which an element exists without a mark.
-fn quiet_windows(shown: &Looks, windows: usize) -> usize {
+fn quiet_windows(shown: &ShownRuns, windows: usize) -> usize {
     let mut runs: Vec<(usize, bool)> = shown
         .runs()
         .map(|(window, look)| (window as usize, look.is_some_and(is_quiet)))
@@ -108,7 +108,7 @@ impl Gate {
     pub(crate) fn turns(&self, view: &View) -> BTreeSet<u32> {
         let shown = self.members.iter();
         let shown = shown.filter_map(|(at, _)| view.arrows_shown.get(*at));
-        shown.flat_map(Looks::runs).map(|run| run.0).collect()
+        shown.flat_map(ShownRuns::runs).map(|run| run.0).collect()
     }
 
     /// Whether each line is drawn separately in some window.

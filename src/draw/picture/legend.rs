@@ -12,7 +12,7 @@ use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::evidence::Confidence;
 use crate::graph::State;
-use crate::view::{ArrowKind, ItemKind, Looks, Mark, Shown, View};
+use crate::view::{ArrowKind, ItemKind, Mark, Shown, ShownRuns, View};
 
 /// A sign with its meaning.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,17 +33,17 @@ pub(crate) enum LegendSign {
 /// The signs that occur in the view, with their words.
 pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> {
     let kind = |kind| view.items.iter().any(|i| i.kind == kind);
-    let any = |is: &dyn Fn(&Shown) -> bool| view.looks().any(is);
+    let any = |is: &dyn Fn(&Shown) -> bool| view.all_shown().any(is);
     let mark = |marks: &[Mark]| any(&|s| s.mark.is_some_and(|m| marks.contains(&m)));
     let change = |own, words| (mark(&[own]), LegendSign::Change(own), words);
     let state = |state, words| {
         let boxes = view.items_shown.iter().chain(&view.arrows_shown);
-        let mut looks = boxes.flat_map(Looks::distinct);
+        let mut looks = boxes.flat_map(ShownRuns::distinct);
         let is_there = looks.any(|s| s.state == state && s.mark.is_none());
         (is_there, LegendSign::Box(state), words)
     };
     let confidence = |confidence, words| {
-        let mut looks = view.arrows_shown.iter().flat_map(Looks::distinct);
+        let mut looks = view.arrows_shown.iter().flat_map(ShownRuns::distinct);
         let is_there = looks.any(|s| s.confidence == confidence);
         (is_there, LegendSign::Line(confidence), words)
     };

@@ -19,7 +19,7 @@ use crate::draw::text::{Fonts, Weight};
 use crate::graph::{ById, Id as _};
 use crate::layout::{self, Link, Outline, Plan, Vertex};
 use crate::view::both;
-use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Looks, Shown, View};
+use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Shown, ShownRuns, View};
 
 /// The largest width of a name in pixels, and in heights of its letters if these are large; longer ones are shortened in
 /// their middle. About 30 letters: of a wider box, a layer of the graph would be mostly space.
@@ -251,7 +251,7 @@ impl Measurer<'_> {
     fn second_lines(&self) -> Vec<Option<f64>> {
         let shown_rates = shown_rates(self.view);
         let mut widest = vec![None; self.view.items.len()];
-        for shown in self.view.items_shown.iter().flat_map(Looks::distinct) {
+        for shown in self.view.items_shown.iter().flat_map(ShownRuns::distinct) {
             let at = shown.id as usize;
             let Some(item) = self.view.items.get(shown.item()) else {
                 continue;
@@ -269,7 +269,7 @@ impl Measurer<'_> {
     fn rooms(&self, topics: &[Vec<String>]) -> ById<ArrowId, Option<Size>> {
         let style = &self.style.edge;
         let reported = shown_by_arrows(self.view);
-        let nothing = Looks::default();
+        let nothing = ShownRuns::default();
         let all = self
             .view
             .arrows

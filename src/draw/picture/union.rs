@@ -13,7 +13,7 @@ use crate::draw::scene::{Form, Group};
 use crate::draw::style::Style;
 use crate::evidence::Confidence;
 use crate::graph::State;
-use crate::view::{Arrow, ArrowId, ItemId, ItemKind, Looks, Mark, Shown};
+use crate::view::{Arrow, ArrowId, ItemId, ItemKind, Mark, Shown, ShownRuns};
 
 /// The whole graph, every element once, drawn as active; a painter omits the colours.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -105,7 +105,7 @@ impl Picture<'_> {
         let view = self.measured.view;
         let mut marks = vec![BTreeSet::new(); view.items.len()];
         let mut latched = BTreeSet::new();
-        for shown in view.items_shown.iter().flat_map(Looks::distinct) {
+        for shown in view.items_shown.iter().flat_map(ShownRuns::distinct) {
             if shown.state == State::Latched {
                 latched.insert(shown.id as usize);
             }

@@ -10,7 +10,7 @@ use crate::draw::style::Color;
 use crate::draw::text::Weight;
 use crate::graph::{ById, Id as _};
 use crate::view::DrawnPart;
-use crate::view::{ArrowId, ItemId, ItemKind, Looks, View};
+use crate::view::{ArrowId, ItemId, ItemKind, ShownRuns, View};
 
 impl Picture<'_> {
     /// The union of the view of which this picture's view is a part.
@@ -39,7 +39,7 @@ impl Picture<'_> {
                     let looks = whole
                         .items_shown
                         .get(ItemId::of(*at))
-                        .map_or(&[][..], Looks::distinct);
+                        .map_or(&[][..], ShownRuns::distinct);
                     union.items[*at] = UnionElement {
                         group: self.word(word, rect),
                         rect,
