@@ -33,9 +33,9 @@ pub mod mission {
 #[cfg(feature = "render")]
 pub mod view {
     pub use crate::view::{
-        AlsoHere, Arrow, ArrowId, ArrowKind, CardRow, Collapsible, Counts, Frame, Headline, Item,
-        ItemId, ItemKind, Lasting, Looks, Mark, MemberState, Members, Namespace, Phrase,
-        SeenWindow, Shown, TopicRow, View, ViewOptions, view,
+        AlsoHere, Arrow, ArrowId, ArrowKind, BoxRow, Collapsible, Counts, Frame, Headline, Item,
+        ItemId, ItemKind, Mark, MemberState, Members, Namespace, OngoingEvent, Phrase, SeenWindow,
+        Shown, ShownRuns, TopicRow, View, ViewOptions, view,
     };
 }
 

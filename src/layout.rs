@@ -375,6 +375,15 @@ pub(crate) struct Component {
     pieces: Vec<usize>,
 }
 
+/// A part of a plan that is laid out in one orientation.
+#[derive(Clone, Copy)]
+struct PartTask<'a> {
+    plan: &'a Plan,
+    options: &'a LayoutOptions,
+    part: &'a Component,
+    orientation: Orientation,
+}
+
 /// The kind of an item of a layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum LayerItem {

@@ -113,8 +113,7 @@ pub use draw::style::Style;
 #[cfg(feature = "render")]
 pub use export::Output;
 pub use graph::Graph;
-pub use graph::diff::Change;
-pub use mission::{EventLog, Mission, Window, write_json};
+pub use mission::{Change, EventLog, Mission, Window, write_json};
 pub use pipeline::Reading;
 #[cfg(feature = "render")]
 pub use pipeline::{Render, Rendered};
@@ -131,7 +130,6 @@ pub mod values {
     pub use crate::evidence::code::SourceCode;
     pub use crate::evidence::collector::{CollectOptions, Recorded};
     pub use crate::evidence::{Confidence, Evidence, EvidenceLine, conclude, given as topology};
-    pub use crate::graph::diff::ValueKind;
     pub use crate::graph::history::{Bound, Life, Sender, Sending, Stretch};
     pub use crate::graph::window::{Align, Cut, Division, Length};
     pub use crate::graph::{

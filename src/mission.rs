@@ -9,8 +9,11 @@ pub mod info;
 pub mod phases;
 pub(crate) mod rates;
 
+pub(crate) mod changes;
 mod joined;
 mod json;
+pub use changes::Change;
+pub(crate) use changes::RATE_CHANGE;
 pub(crate) use json::Json;
 pub use json::{read_json, write_json};
 
@@ -20,7 +23,6 @@ use crate::bag::Report;
 use crate::base::geometry::Rect;
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
-use crate::graph::diff::{Change, Changes};
 use crate::graph::history::Sending;
 use crate::graph::{ById, Element, Elements, Graph, Graphs, NodeId, TopicId};
 
@@ -133,7 +135,7 @@ impl Mission {
 
     /// Determines the changes from each window to the next, by the event log.
     pub(crate) fn explain(&mut self) {
-        let reported = event_log::explain(&self.graphs, &self.elements, &self.log);
+        let reported = changes::explain(&self.graphs, &self.elements, &self.log);
         for (window, (changes, events)) in self.windows.iter_mut().zip(reported) {
             (window.changes, window.events) = (changes, events);
         }
@@ -143,14 +145,14 @@ impl Mission {
     /// missions with known windows only. A rate must change by more than the fraction `threshold`;
     /// `restarts` are nodes that restarted under the same name, sorted by time.
     pub fn find_changes(&mut self, threshold: f64, restarts: &[(NodeId, Stamp)]) {
-        let mut changes = Changes::new(&self.elements, threshold);
+        let mut finder = changes::Changes::new(&self.elements, threshold);
         for (window, graph) in self.windows.iter_mut().zip(&self.graphs) {
             let inside: Vec<_> = restarts
                 .iter()
                 .copied()
                 .filter(|(_, at)| window.span.contains(*at))
                 .collect();
-            window.changes = changes.next(window.span, &graph, &inside);
+            window.changes = finder.next(window.span, &graph, &inside);
         }
         let all = self.elements.all();
         for (what, seen) in all.zip(self.elements.seen_mut()) {
@@ -160,8 +162,8 @@ impl Mission {
             seen.lives = lives;
         }
         self.sending = Sending::of_windows(&self.elements, &self.graphs);
-        self.log = event_log::from_changes(&self.elements, &self.windows);
-        let places = event_log::places(&self.log, &self.windows);
+        self.log = changes::from_changes(&self.elements, &self.windows);
+        let places = changes::places(&self.log, &self.windows);
         for (window, places) in self.windows.iter_mut().zip(places) {
             window.events = places;
         }

@@ -32,15 +32,15 @@ pub(crate) use filtered::filtered;
 pub(crate) use fold::namespaces::COMMON;
 pub use fold::namespaces::Collapsible;
 pub(crate) use fold::namespaces::headlines;
-pub use fold::rows::CardRow;
+pub use fold::rows::BoxRow;
 pub(crate) use frames::{BETWEEN_PHRASES, Words, joined};
 pub use frames::{Frame, Headline, Phrase};
 pub(crate) use listed::{DrawnPart, drawn_part};
-pub use marked::Lasting;
+pub use marked::OngoingEvent;
 pub(crate) use omitted::{none_pass, nothing, unmatched, unmatched_topics};
 pub use options::{Grouping, Hide, Mode, NameFilter, ViewOptions};
 use shown::sum;
-pub use shown::{Looks, Mark, Members, Shown, TopicRow};
+pub use shown::{Mark, Members, Shown, ShownRuns, TopicRow};
 pub(crate) use shown::{STEPS, both, decades};
 pub use still::Presence;
 pub(crate) use still::union;
@@ -188,7 +188,7 @@ pub struct AlsoHere {
     /// The nodes, then the topics, each sorted by name.
     pub items: Vec<Item>,
     /// The looks of each, window by window.
-    pub shown: Vec<Looks>,
+    pub shown: Vec<ShownRuns>,
 }
 
 /// The presence of one of several equal namespaces in a window.
@@ -335,7 +335,7 @@ pub struct View {
     /// Every namespace with a box around its members; parents before children.
     pub namespaces: Vec<Namespace>,
     /// The topics that are listed as rows in boxes.
-    pub rows: Vec<CardRow>,
+    pub rows: Vec<BoxRow>,
     /// Whether a box lists at most three of these, else two and the number of the others.
     pub lists_few: bool,
     /// The nodes and topics that are listed as words, by namespace.
@@ -343,9 +343,9 @@ pub struct View {
     /// The windows.
     pub frames: Vec<Frame>,
     /// The looks of each item, window by window.
-    pub items_shown: ById<ItemId, Looks>,
+    pub items_shown: ById<ItemId, ShownRuns>,
     /// The looks of each arrow, window by window.
-    pub arrows_shown: ById<ArrowId, Looks>,
+    pub arrows_shown: ById<ArrowId, ShownRuns>,
     /// The times at which each item of a still was there; none for a film, and where nothing comes or goes.
     pub presences: ById<ItemId, Presence>,
     /// Whether two missions are compared, A and B, so that times, windows and the timeline are meaningless;
@@ -399,7 +399,7 @@ impl View {
 
     /// The items and arrows visible in window `k`; none past the last one.
     pub fn seen(&self, k: usize) -> SeenWindow {
-        let of = |all: &[Looks]| all.iter().filter_map(|one| self.seen_at(one, k)).collect();
+        let of = |all: &[ShownRuns]| all.iter().filter_map(|one| self.seen_at(one, k)).collect();
         SeenWindow {
             items: of(&self.items_shown),
             arrows: of(&self.arrows_shown),
@@ -407,18 +407,18 @@ impl View {
     }
 
     /// The look of an element in window `k`.
-    pub(crate) fn seen_at(&self, looks: &Looks, k: usize) -> Option<Shown> {
+    pub(crate) fn seen_at(&self, looks: &ShownRuns, k: usize) -> Option<Shown> {
         let mut shown = looks.at(k)?.clone();
         shown.is_one_of_many = self.frames.get(k)?.is_one_of_many(&shown.events);
         Some(shown)
     }
 
     /// Every look of any item or arrow, in no particular order.
-    pub fn looks(&self) -> impl Iterator<Item = &Shown> {
+    pub fn all_shown(&self) -> impl Iterator<Item = &Shown> {
         let all = self.items_shown.iter().chain(&self.arrows_shown);
         let also = self.also.iter().flat_map(|also| &also.shown);
         let rows = self.rows.iter().map(|row| &row.shown);
-        all.chain(also).chain(rows).flat_map(Looks::distinct)
+        all.chain(also).chain(rows).flat_map(ShownRuns::distinct)
     }
 
     /// The index of the window with most headlines, the first of several; [`View::busiest`] if there are

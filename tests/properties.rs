@@ -6,7 +6,7 @@ use bagreel::internals::graph::{ElementState, Graph, State};
 use std::collections::BTreeSet;
 
 use bagreel::values::{EdgeId, Element, Kind, Length, NodeId, Period, TopicId};
-use bagreel::{Change, Mission, Reading, read};
+use bagreel::{Mission, Reading, read};
 use proptest::collection::btree_map;
 use proptest::prelude::*;
 
@@ -112,18 +112,15 @@ fn follows(mission: &Mission) -> Result<(), TestCaseError> {
         let mut now = before.unwrap_or_else(|| there(&graph));
         for (change, entry) in window.changes.iter().zip(&window.events) {
             let kind = mission.log.events[*entry].kind;
-            match change {
-                Change::Added { what, .. } => {
-                    prop_assert!(now.insert(*what), "{what:?} came twice");
-                    let begins = [Kind::Started, Kind::Appeared, Kind::Restarted];
-                    prop_assert!(begins.contains(&kind), "{kind:?}");
-                }
-                Change::Removed { what, .. } => {
-                    prop_assert!(now.remove(what), "{what:?} was not there");
-                    let ends = [Kind::Stopped, Kind::Vanished, Kind::Restarted];
-                    prop_assert!(ends.contains(&kind), "{kind:?}");
-                }
-                _ => {}
+            let what = change.what;
+            if change.is_added() {
+                prop_assert!(now.insert(what), "{what:?} came twice");
+                let begins = [Kind::Started, Kind::Appeared, Kind::Restarted];
+                prop_assert!(begins.contains(&kind), "{kind:?}");
+            } else if change.is_removed() {
+                prop_assert!(now.remove(&what), "{what:?} was not there");
+                let ends = [Kind::Stopped, Kind::Vanished, Kind::Restarted];
+                prop_assert!(ends.contains(&kind), "{kind:?}");
             }
         }
         prop_assert_eq!(&now, &there(&graph), "window {}", window.index);

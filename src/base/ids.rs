@@ -1,8 +1,17 @@
-//! Ids as types, and lists with a value per id.
+//! Ids as types, lists with a value per id, and lists by key.
 
 use std::collections::BTreeMap;
 use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut, Index, IndexMut};
+
+/// The values of each key, in their order.
+pub(crate) fn grouped<K: Ord, V>(pairs: impl IntoIterator<Item = (K, V)>) -> BTreeMap<K, Vec<V>> {
+    let mut groups = BTreeMap::<K, Vec<V>>::new();
+    for (key, value) in pairs {
+        groups.entry(key).or_default().push(value);
+    }
+    groups
+}
 
 /// The number of a thing in the list of all things of its kind, counted from 0.
 pub trait Id: Copy {

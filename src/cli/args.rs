@@ -11,8 +11,8 @@ use crate::base::time::{Moment, Period};
 use crate::base::words::worded;
 use crate::evidence::code::SourceCode;
 use crate::evidence::{conclude, given};
-use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::{Align, Cut, Division, Length};
+use crate::mission::RATE_CHANGE;
 use crate::pipeline::{Phases, Reading};
 
 #[derive(Debug, Default, Args)]

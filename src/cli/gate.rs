@@ -16,9 +16,9 @@ use crate::base::notice::Notices;
 use crate::base::words;
 use crate::export::target::Target;
 use crate::gate::{FORMATS, Judgement, ReportFormat, Severity, explain};
-use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::Length;
 use crate::mission::Mission;
+use crate::mission::RATE_CHANGE;
 use crate::pipeline::{self, Baseline, Check, Diff, Reading, Report};
 
 #[derive(Debug, Args)]

@@ -16,7 +16,6 @@ mod measured;
 pub(crate) mod options;
 pub(crate) mod page;
 mod presence;
-mod replicas;
 mod room;
 mod spaces;
 mod spotlight;
@@ -26,12 +25,12 @@ mod union;
 mod words;
 
 use self::arrows::ArrowPath;
-use self::boxes::{Boxes, ItemBox};
+use self::boxes::ItemBox;
 use self::gates::Gate;
 pub use self::ids::unshown;
 use self::ids::{arrow_id, encoded, item_id};
 use self::measured::MeasuredGraph;
-use self::page::{GraphFit, PageFrame, Strip};
+use self::page::{GraphFit, GraphPen, PageFrame, Strip};
 use self::spotlight::Spotlight;
 use self::title::Title;
 pub use self::union::{Union, UnionElement, rate_label, sign};
@@ -341,7 +340,7 @@ impl<'a> Picture<'a> {
 
     fn graph(&self, (k, frame): (usize, &Frame), seen: &SeenWindow, groups: &mut Vec<Group>) {
         let view = self.measured.view;
-        let boxes = self.boxes();
+        let pen = self.pen();
         let full = view.inhabited(seen);
         let spotlight = Spotlight::new(&self.measured, (k, frame), seen);
         let pale = |mut group: Group| {
@@ -360,7 +359,7 @@ impl<'a> Picture<'a> {
                 .flatten();
             let now = view.place_in_time(frame.index);
             let member_list = member_list
-                .map(|who| boxes.member_list(space, (*place, self.shifts[at]), &id, (now, who)));
+                .map(|who| pen.member_list(space, (*place, self.shifts[at]), &id, (now, who)));
             let empty = (!full[at]).then(|| {
                 if self.measured.graph.first_seen[at] > frame.index {
                     "not on yet"
@@ -368,8 +367,8 @@ impl<'a> Picture<'a> {
                     "off"
                 }
             });
-            let mut space = boxes.space(space, *place, &id, empty);
-            titles.push(boxes.title_of(&mut space, self.shifts[at]));
+            let mut space = pen.space(space, *place, &id, empty);
+            titles.push(pen.title_of(&mut space, self.shifts[at]));
             titles.extend(member_list.filter(|member_list| !member_list.pieces.is_empty()));
             groups.push(space);
         }
@@ -378,7 +377,7 @@ impl<'a> Picture<'a> {
                 Some(at) => self.layout.clusters.get(at),
                 None => self.layout.boxes.get(view.items.len()),
             };
-            let words = place.and_then(|place| boxes.footer(footer, also, *place, (view, k)));
+            let words = place.and_then(|place| pen.footer(footer, also, *place, (view, k)));
             let is_news = words.as_ref().is_some_and(also::is_news);
             titles.extend(if is_news { words } else { words.map(pale) });
         }
@@ -389,15 +388,16 @@ impl<'a> Picture<'a> {
         });
         let glows = items
             .clone()
-            .filter_map(|(item, card, shown)| boxes.glow(item, card, shown));
+            .filter_map(|(item, card, shown)| pen.glow(item, card, shown));
         // Lines do not cross words.
         groups.extend(glows.chain(lines).chain(titles).chain(labels));
         for (item, card, shown) in items {
-            let mut drawn = boxes.item(item, card, shown);
+            let mut drawn = pen.item(item, card, shown);
             if let Some(presence) = view.presences.get(shown.item()) {
-                boxes.presence(&mut drawn, presence, card, item.kind);
+                pen.presence(&mut drawn, presence, card, item.kind);
             }
-            let rows = boxes.card_rows(card, view, k);
+            let rows = card.card.iter();
+            let rows = rows.flat_map(|rows| pen.card_rows((rows, &card.id), card.place, (view, k)));
             let all = std::iter::once(drawn).chain(rows);
             if spotlight
                 .as_ref()
@@ -410,8 +410,8 @@ impl<'a> Picture<'a> {
         }
     }
 
-    fn boxes(&self) -> Boxes<'_> {
-        Boxes {
+    fn pen(&self) -> GraphPen<'_> {
+        GraphPen {
             style: self.measured.style,
             fonts: self.measured.fonts,
             fit: self.fit,
@@ -443,7 +443,7 @@ fn places(
 }
 
 fn cards(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ItemBox> {
-    let shown_rates = measured::shown_rates(measured.view);
+    let shown_rates = texts::shown_rates(measured.view);
     let items = measured.view.items.iter().zip(&layout.boxes);
     let labels = measured.graph.labels.iter().zip(&measured.graph.cards);
     items

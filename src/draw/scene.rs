@@ -156,55 +156,72 @@ impl Anchor {
     }
 }
 
-impl Text {
-    /// A text that is vertically centred on a point.
-    pub(crate) fn centred(
-        anchor: Anchor,
-        on: Point,
-        (size, weight): (f64, Weight),
-        color: Color,
-        text: impl Into<String>,
-    ) -> Self {
+/// The size in pixels, the weight and the colour of a text.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Font {
+    pub(crate) size: f64,
+    pub(crate) weight: Weight,
+    pub(crate) color: Color,
+}
+
+impl Font {
+    pub(crate) fn new(size: f64, weight: Weight, color: Color) -> Self {
         Self {
-            at: Point::new(on.x, on.y + size * 0.36),
-            anchor,
             size,
             weight,
             color,
-            halo: None,
-            text: text.into(),
         }
     }
 }
 
+impl Text {
+    /// A text at a point on its baseline.
+    pub(crate) fn new(anchor: Anchor, at: Point, font: Font, text: impl Into<String>) -> Self {
+        Self {
+            at,
+            anchor,
+            size: font.size,
+            weight: font.weight,
+            color: font.color,
+            halo: None,
+            text: text.into(),
+        }
+    }
+
+    /// A text that is vertically centred on a point.
+    pub(crate) fn centred(anchor: Anchor, on: Point, font: Font, text: impl Into<String>) -> Self {
+        let at = Point::new(on.x, on.y + font.size * 0.36);
+        Self::new(anchor, at, font, text)
+    }
+
+    /// The text with a line behind its letters.
+    pub(crate) fn with_halo(self, color: Color, width: f64) -> Self {
+        let halo = Some((color, width));
+        Self { halo, ..self }
+    }
+}
+
 impl Shape {
+    /// A shape with a line around.
+    pub fn new(form: Form, fill: Color, stroke: Stroke) -> Self {
+        Self { form, fill, stroke }
+    }
+
     /// A shape without a line around.
     pub fn filled(form: Form, fill: Color) -> Self {
-        Self {
-            form,
-            fill,
-            stroke: Stroke::default(),
-        }
+        Self::new(form, fill, Stroke::default())
     }
 
     /// A line without a fill.
     pub fn line(form: Form, stroke: Stroke) -> Self {
-        Self {
-            form,
-            fill: Color::NONE,
-            stroke,
-        }
+        Self::new(form, Color::NONE, stroke)
     }
 }
 
 impl Stroke {
     /// A solid line.
     pub fn solid(color: Color, width: f64) -> Self {
-        Self {
-            color,
-            width,
-            dash: Vec::new(),
-        }
+        Self::dashed(color, width, &[])
     }
 
     /// A line of these lengths of line, gap, line, gap, …
@@ -243,11 +260,11 @@ impl Group {
             Form::Path(steps) => Form::Path(steps.iter().map(|step| step.mapped(point)).collect()),
         };
         let piece = |piece: &Piece| match piece {
-            Piece::Shape(shape) => Piece::Shape(Shape {
-                form: form(&shape.form),
-                fill: shape.fill,
-                stroke: shape.stroke.scaled(by),
-            }),
+            Piece::Shape(Shape {
+                form: f,
+                fill,
+                stroke,
+            }) => Piece::Shape(Shape::new(form(f), *fill, stroke.scaled(by))),
             Piece::Text(text) => Piece::Text(Text {
                 at: point(text.at),
                 size: text.size * by,
@@ -277,11 +294,27 @@ impl Group {
 
     /// A group outside of the graph, such as a title: an id, which is also its class, and no content yet.
     pub fn named(id: &str) -> Self {
+        Self::new(id, id)
+    }
+
+    /// A group of this class without attributes and content yet.
+    pub(crate) fn new(id: impl Into<String>, class: impl Into<String>) -> Self {
         Self {
-            id: id.to_owned(),
-            class: id.to_owned(),
+            id: id.into(),
+            class: class.into(),
             ..Self::default()
         }
+    }
+
+    /// The group with these attributes.
+    pub(crate) fn with(self, data: Vec<(&'static str, String)>) -> Self {
+        Self { data, ..self }
+    }
+
+    /// The group with its content in words.
+    pub(crate) fn titled(self, title: impl Into<String>) -> Self {
+        let title = title.into();
+        Self { title, ..self }
     }
 
     /// Adds a shape.

@@ -7,7 +7,7 @@ use crate::base::geometry::{Point, Rect, Size};
 use crate::base::time;
 use crate::base::words;
 use crate::draw::picture::{Measured, PageOptions, Picture};
-use crate::draw::scene::{Anchor, Form, Group, Piece, Scene, Shape, Stroke, Text};
+use crate::draw::scene::{Anchor, Font, Form, Group, Piece, Scene, Shape, Stroke, Text};
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::draw::timeline::canvas::PX_PER_MM;
@@ -31,7 +31,8 @@ const ENLARGED: f64 = 1.2;
 const NARROWEST: f64 = 480.0;
 /// Shapes of panels that are tried on paper: height over width.
 pub(crate) const SHAPES: [f64; 4] = [0.4, 0.6, 1.0, 1.6];
-/// The largest height of a strip over its width, if there is a choice.
+/// The largest height of a strip over its width, if there is a choice: a page of A4, 1.4 times as high as
+/// wide, has room for its caption.
 const HIGHEST: f64 = 1.3;
 
 /// A strip and remarks for the user.
@@ -257,22 +258,11 @@ impl<'a> StripSource<'a> {
             (joined(&frame.fitting(fits)), Weight::Regular),
         ];
         for (row, (words, weight)) in (1_u8..).zip(lines) {
-            let most = page.panel.w;
-            panel.text(Text {
-                at: Point::new(
-                    corner.x,
-                    border.bottom() + f64::from(row) * 1.3 * page.caption,
-                ),
-                anchor: Anchor::Start,
-                size: page.caption,
-                weight,
-                color: self.style.legend.text,
-                halo: None,
-                text: self
-                    .fonts
-                    .fit(&self.fonts.shown(&words), page.caption, weight, most)
-                    .into_owned(),
-            });
+            let (size, words) = (page.caption, self.fonts.shown(&words));
+            let at = Point::new(corner.x, border.bottom() + f64::from(row) * 1.3 * size);
+            let font = Font::new(size, weight, self.style.legend.text);
+            let words = self.fonts.fit(&words, size, weight, page.panel.w);
+            panel.text(Text::new(Anchor::Start, at, font, words));
         }
         groups.push(panel);
         let aside = (page.panel.w - scene.size.w * page.scale).max(0.0) / 2.0;

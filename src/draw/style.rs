@@ -109,11 +109,7 @@ impl Body {
 
     /// The weight of its names.
     pub(crate) fn weight(&self) -> Weight {
-        if self.bold {
-            Weight::SemiBold
-        } else {
-            Weight::Regular
-        }
+        Weight::of(self.bold)
     }
 }
 

@@ -25,6 +25,17 @@ pub enum Weight {
     SemiBold,
 }
 
+impl Weight {
+    /// Bold or not.
+    pub fn of(is_bold: bool) -> Self {
+        if is_bold {
+            Self::SemiBold
+        } else {
+            Self::Regular
+        }
+    }
+}
+
 /// The width of every character of one font, in em.
 #[derive(Debug)]
 struct Face {

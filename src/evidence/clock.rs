@@ -5,12 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use crate::base::budget;
-use crate::base::ids::ById;
+use crate::base::ids::{ById, grouped};
 use crate::base::rhythm::GAP_NS;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::inference::Stream;
 use crate::evidence::observation::Observations;
-use crate::evidence::times::{Calendar, SeriesId};
+use crate::evidence::times::Calendar;
 
 pub(crate) const DAY: i64 = 86_400_000_000_000;
 /// The distance in days beyond which times count as far from all others: no mission has a pause of a year.
@@ -247,14 +247,10 @@ pub(crate) fn repeats(
     span: Span,
     is_again: impl Fn(&Stream) -> bool,
 ) -> io::Result<bool> {
-    let mut series: BTreeMap<_, Vec<SeriesId>> = BTreeMap::new();
-    for (at, own) in facts.payloads.somes() {
-        let stream = &streams[at];
-        if !stream.latched && is_again(stream) {
-            let key = (stream.topic, stream.publisher);
-            series.entry(key).or_default().push(*own);
-        }
-    }
+    let all = facts.payloads.somes();
+    let all = all.map(|(at, own)| (&streams[at], *own));
+    let all = all.filter(|(stream, _)| !stream.latched && is_again(stream));
+    let series = grouped(all.map(|(of, own)| ((of.topic, of.publisher), own)));
     let (mut all, mut copies) = (0, 0);
     for own in series.values() {
         let mut contents = Vec::new();

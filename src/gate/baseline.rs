@@ -8,6 +8,7 @@ use super::expectation::SCHEMA;
 use super::facts::{Facts, Rate, Role, TopicIn};
 use super::values::Range;
 use crate::base::budget;
+use crate::base::ids::grouped;
 use crate::base::rhythm::{CLOSING_NS, FEWEST, FEWEST_OF_MEAN, GAP_NS};
 use crate::base::time::{Period, Stamp};
 use crate::base::words::{self, visible_json};
@@ -198,12 +199,8 @@ impl Draft {
 }
 
 fn nodes(runs: &[Facts<'_>], times: &Times) -> BTreeMap<String, Line> {
-    let mut all: BTreeMap<&str, Vec<Role<'_>>> = BTreeMap::new();
-    for facts in runs {
-        for role in facts.robot_roles() {
-            all.entry(role.name).or_default().push(role);
-        }
-    }
+    let roles = runs.iter().flat_map(Facts::robot_roles);
+    let all = grouped(roles.map(|role| (role.name, role)));
     let line = |(name, seen): (&str, Vec<Role<'_>>)| {
         let is_optional = seen.len() < runs.len();
         (name.to_owned(), node(&seen, times, is_optional))
@@ -314,13 +311,8 @@ struct WideTimes {
 }
 
 fn topics(runs: &[Facts<'_>], times: &Times) -> BTreeMap<String, Line> {
-    let mut all: BTreeMap<&str, Vec<TopicIn<'_>>> = BTreeMap::new();
-    for facts in runs {
-        for id in facts.robot_topics() {
-            let own = all.entry(facts.topic(id)).or_default();
-            own.push(TopicIn { facts, id });
-        }
-    }
+    let of = |facts| move |id| (Facts::topic(facts, id), TopicIn { facts, id });
+    let all = grouped(runs.iter().flat_map(|run| run.robot_topics().map(of(run))));
     let line = |(name, seen): (&str, Vec<TopicIn<'_>>)| {
         let is_optional = seen.len() < runs.len();
         (name.to_owned(), topic(&seen, times, is_optional))

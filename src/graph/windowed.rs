@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::base::cast;
 use crate::base::error::Result;
-use crate::base::ids::Few;
+use crate::base::ids::{Few, grouped};
 use crate::base::name::is_quiet;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Confidence;
@@ -569,11 +569,8 @@ pub(crate) struct TopicCount {
 /// # Errors
 /// If the temporary file of times cannot be read.
 pub(crate) fn counts(recorded: &Recorded, windows: &[Span]) -> Result<Vec<TopicCount>> {
-    let mut streams: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
-    for (at, stream) in recorded.streams.iter().enumerate() {
-        let topic = stream.connection.topic.as_str();
-        streams.entry(topic).or_default().push(at);
-    }
+    let streams = recorded.streams.iter().enumerate();
+    let streams = grouped(streams.map(|(at, of)| (of.connection.topic.as_str(), at)));
     let mut all = Vec::new();
     for (topic, streams) in streams {
         let topic: Arc<str> = topic.into();

@@ -5,6 +5,7 @@ use super::routes::around;
 use super::{Layout, LayoutOptions, Orientation, Plan};
 use crate::base::geometry::{Point, Rect, Size};
 
+/// The space between boxes, and between a frame and its boxes: no lines run there.
 const GAP: f64 = 14.0;
 const PADDING: f64 = 8.0;
 

@@ -21,20 +21,18 @@ use rayon::prelude::*;
 
 use super::layers::{Lane, cut, items};
 use super::spacing::{Spacing, turned};
-use super::{
-    Component, Engine, LayerRows, Layers, Layout, LayoutOptions, Orientation, Plan, Route,
-};
+use super::{Component, Engine, Layers, Layout, LayoutOptions, Orientation, PartTask, Plan, Route};
 use super::{grid, pack, routes};
 use crate::base::error::Result;
 use crate::base::geometry::{Point, Rect, Size};
-use order::Search;
+use order::{LayerOrder, Search};
 
-/// The space between parts.
+/// The space between parts: more than between boxes, so that parts are seen as such.
 const PART_GAP: f64 = 20.0;
 /// The most parts of which small ones are placed in the gaps of others.
 const MOST_NESTED: usize = 24;
 /// The largest number of edges of a part that is cut in several ways; a larger one is cut only in the way that keeps it
-/// small.
+/// small. Each way is a whole layout.
 const MANY: usize = 300;
 /// The largest number of items in layers that are laid out.
 const MOST: usize = 150_000;
@@ -58,7 +56,7 @@ pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
         return layout;
     };
     let tried = |orientation| {
-        let (crossings, mut layout) = draft.assembled(plan, options, orientation);
+        let (crossings, mut layout) = draft.assembled(orientation);
         let length = layout.routes.iter().map(Route::length).sum();
         let quality = quality(layout.size, (crossings, length), plan.links.len(), options)
             * use_of(pack::fit(layout.size, options.page), options);
@@ -95,41 +93,49 @@ fn labelled(plan: &Plan, layout: &Layout) -> f64 {
 }
 
 /// The parts of a plan, each with the ways of ordering it.
-struct Draft {
+struct Draft<'a> {
+    plan: &'a Plan,
+    options: &'a LayoutOptions,
     parts: Vec<Component>,
     orderings: Vec<Vec<Ordering>>,
 }
 
-impl Draft {
+impl<'a> Draft<'a> {
     /// The draft of a valid plan; `None` if a part is too large for layers.
-    fn new(plan: &Plan, options: &LayoutOptions) -> Option<Self> {
+    fn new(plan: &'a Plan, options: &'a LayoutOptions) -> Option<Self> {
         let parts = parts::parts(plan);
         let ways = parts.iter().map(|part| orderings(plan, part, options));
         let orderings: Vec<Vec<Ordering>> = ways.collect();
         let is_whole = !orderings.iter().any(Vec::is_empty);
-        is_whole.then_some(Self { parts, orderings })
+        is_whole.then_some(Self {
+            plan,
+            options,
+            parts,
+            orderings,
+        })
     }
 
     /// The best layout of every part, packed on the page; and the number of crossings.
-    fn assembled(
-        &self,
-        plan: &Plan,
-        options: &LayoutOptions,
-        orientation: Orientation,
-    ) -> (u64, Layout) {
-        let parts = self.parts.iter().zip(&self.orderings);
-        let blocks = parts
-            .map(|(part, orderings)| best_block(plan, options, part, orderings, orientation))
-            .collect();
-        assembled(plan, options, &self.parts, blocks, orientation)
+    fn assembled(&self, orientation: Orientation) -> (u64, Layout) {
+        let Self { plan, options, .. } = *self;
+        let blocks = self.parts.iter().zip(&self.orderings);
+        let blocks = blocks.map(|(part, orderings)| {
+            let task = PartTask {
+                plan,
+                options,
+                part,
+                orientation,
+            };
+            (part, best_block(task, orderings))
+        });
+        assembled(plan, options, blocks.collect(), orientation)
     }
 }
 
 /// One way of cutting and ordering a part.
 struct Ordering {
     layers: Layers,
-    rows: LayerRows,
-    crossings: u64,
+    order: LayerOrder,
 }
 
 /// The drafts of a part, none if it is too large: every way of ranking, with long edges routed outside and
@@ -168,16 +174,14 @@ fn orderings(plan: &Plan, part: &Component, options: &LayoutOptions) -> Vec<Orde
     };
     let both = searches.into_par_iter().zip(is_promising);
     let found: Vec<_> = both.map(|(search, is)| is.then(|| last(search))).collect();
-    let ordering = |(layers, found): (Layers, Option<(LayerRows, u64)>)| {
-        let (rows, crossings) = found?;
+    let both = layers.into_iter().zip(found);
+    both.filter_map(|(layers, order)| {
         Some(Ordering {
             layers,
-            rows,
-            crossings,
+            order: order?,
         })
-    };
-    let both = layers.into_iter().zip(found);
-    both.filter_map(ordering).collect()
+    })
+    .collect()
 }
 
 /// The share of the best possible quality below which the search for an order is abandoned. Compared with
@@ -195,19 +199,16 @@ fn promising(
     if searches.len() == 1 && options.least == 0.0 {
         return (vec![true], true);
     }
-    let bound = |search: &Search, orientation| {
-        let (rows, crossings) = search.found();
-        bound(
+    let bounds = orientations(options).into_iter().map(|orientation| {
+        let task = PartTask {
             plan,
             options,
             part,
-            (search.layers, &rows, crossings),
             orientation,
-        )
-    };
-    let bounds = orientations(options).into_iter().map(|orientation| {
+        };
         let all = searches.par_iter();
-        all.map(|search| bound(search, orientation)).collect()
+        all.map(|search| bound(task, search.layers, &search.found()))
+            .collect()
     });
     let bounds: Vec<Vec<Bound>> = bounds.collect();
     let is_useful = bounds
@@ -238,20 +239,13 @@ struct Bound {
 }
 
 /// The upper bounds for the drawing of a part with this order.
-fn bound(
-    plan: &Plan,
-    options: &LayoutOptions,
-    part: &Component,
-    (layers, rows, crossings): (&Layers, &LayerRows, u64),
-    orientation: Orientation,
-) -> Bound {
-    let room = Spacing::new(plan, options, part, layers, orientation);
-    let (size, length) = room.least(rows, &room.apart(rows));
-    let size = turned(size, orientation);
-    let quality = quality(size, (crossings, length), part.links.len(), options);
+fn bound(task: PartTask<'_>, layers: &Layers, order: &LayerOrder) -> Bound {
+    let room = Spacing::new(task, layers);
+    let (size, length) = room.least(&order.rows, &room.apart(&order.rows));
+    let size = turned(size, task.orientation);
     Bound {
-        fit: pack::fit(size, options.page),
-        quality: quality * ROUNDING,
+        fit: pack::fit(size, task.options.page),
+        quality: task.quality(size, (order.crossings, length)) * ROUNDING,
     }
 }
 
@@ -325,6 +319,19 @@ fn quality(
     readable * shortness / (1.0 + CROSSING * crossings as f64 / links)
 }
 
+impl PartTask<'_> {
+    /// The quality of a drawing of the part.
+    fn quality(&self, size: Size, costs: (u64, f64)) -> f64 {
+        quality(size, costs, self.part.links.len(), self.options)
+    }
+
+    /// The quality of a block.
+    fn judged(&self, block: &PlacedPart) -> f64 {
+        let length = block.routes.iter().map(Route::length).sum();
+        self.quality(block.size, (block.crossings, length))
+    }
+}
+
 /// The share of the smallest useful scale below which all drawings are equally useless: a sketch has no useful scale.
 const MOST_USELESS: f64 = 4.0;
 
@@ -338,27 +345,14 @@ fn use_of(fit: f64, options: &LayoutOptions) -> f64 {
 const ROUNDING: f64 = 1.0 + 1e-9;
 
 /// The best of all ways to place a part.
-fn best_block(
-    plan: &Plan,
-    options: &LayoutOptions,
-    part: &Component,
-    orderings: &[Ordering],
-    orientation: Orientation,
-) -> PlacedPart {
-    let links = part.links.len();
-    let judge = |block: &PlacedPart| {
-        let length = block.routes.iter().map(Route::length).sum();
-        quality(block.size, (block.crossings, length), links, options)
-    };
-    let judged = |block: PlacedPart| (judge(&block), block);
+fn best_block(task: PartTask<'_>, orderings: &[Ordering]) -> PlacedPart {
+    let options = task.options;
+    let judged = |block: PlacedPart| (task.judged(&block), block);
     let better = |best: (f64, PlacedPart), next: (f64, PlacedPart)| {
         if next.0 > best.0 { next } else { best }
     };
     // The most promising first: most others can then be rejected before they are placed.
-    let hoped = |ordering: &Ordering| {
-        let found = (&ordering.layers, &ordering.rows, ordering.crossings);
-        bound(plan, options, part, found, orientation).quality
-    };
+    let hoped = |way: &Ordering| bound(task, &way.layers, &way.order).quality;
     let mut ways: Vec<(f64, usize)> = orderings.iter().map(hoped).zip(0..).collect();
     ways.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut best: Option<(f64, usize, PlacedPart)> = None;
@@ -366,7 +360,7 @@ fn best_block(
         if best.as_ref().is_some_and(|best| hope < best.0) {
             break;
         }
-        let (quality, block) = judged(block(plan, options, part, &orderings[at], orientation));
+        let (quality, block) = judged(block(task, &orderings[at]));
         let is_better = |best: &(f64, usize, PlacedPart)| {
             quality.total_cmp(&best.0).then(best.1.cmp(&at)).is_gt()
         };
@@ -377,50 +371,41 @@ fn best_block(
     let Some(best) = best.map(|(quality, _, block)| (quality, block)) else {
         return PlacedPart::default();
     };
-    if links > MANY {
+    if task.part.links.len() > MANY {
         return best.1;
     }
-    let is_long = wrap::is_long(best.1.size, options, orientation);
-    let inside = inside::inside(plan, options, part, is_long, orientation);
+    let is_long = wrap::is_long(best.1.size, task);
+    let inside = inside::inside(task, is_long);
     // Orders that only differ in the lanes of edges are cut into the same rows.
     let mut seen = BTreeSet::new();
     let ways = orderings.iter().filter(|_| is_long);
     let ways = ways.filter(|way| seen.insert(&way.layers.rank[..way.layers.vertices]));
-    let wraps = ways.flat_map(|way| wrap::wraps(plan, options, part, &way.layers, orientation));
+    let wraps = ways.flat_map(|way| wrap::wraps(task, &way.layers));
     let others = inside.into_iter().chain(wraps).map(judged);
     let best = others.fold(best, better);
     // Layers show the way of the data best; blocks are for what does not fit the page in layers.
     if options.least.is_infinite() || pack::fit(best.1.size, options.page) >= 1.0 {
         return best.1;
     }
-    let blocks = blocks::best(plan, options, part, orientation, judge);
-    blocks.into_iter().fold(best, better).1
+    blocks::best(task).into_iter().fold(best, better).1
 }
 
-fn block(
-    plan: &Plan,
-    options: &LayoutOptions,
-    part: &Component,
-    ordering: &Ordering,
-    orientation: Orientation,
-) -> PlacedPart {
-    let layers = &ordering.layers;
-    let room = Spacing::new(plan, options, part, layers, orientation);
-    let across = place::place(layers, &ordering.rows, &room.apart(&ordering.rows));
-    let columns = room.columns(&ordering.rows, &across);
-    let mut placed = routed(plan, part, &room, &across, &columns);
-    placed.crossings = ordering.crossings;
+fn block(task: PartTask<'_>, Ordering { layers, order }: &Ordering) -> PlacedPart {
+    let room = Spacing::new(task, layers);
+    let across = place::place(layers, &order.rows, &room.apart(&order.rows));
+    let columns = room.columns(&order.rows, &across);
+    let mut placed = routed(task, &room, &across, &columns);
+    placed.crossings = order.crossings;
     placed.clusters = room.frames(&placed.boxes, &across, &columns);
     for (route, chain) in placed.routes.iter_mut().zip(&layers.chains) {
         route.label = room.label_of(chain, &across, &columns);
     }
-    placed.on_page(orientation)
+    placed.on_page(task.orientation)
 }
 
 /// The boxes and routes of a part with layers at these positions, x along and y across.
 pub(crate) fn routed(
-    plan: &Plan,
-    part: &Component,
+    PartTask { plan, part, .. }: PartTask<'_>,
     room: &Spacing<'_>,
     across: &[f64],
     columns: &[(f64, f64)],
@@ -479,42 +464,35 @@ impl PlacedPart {
 
 impl PlacedPart {
     /// The block with the places that its labels probably take, so that they do not cover the block next to it.
-    fn with_labels(&self, plan: &Plan, part: &Component, orientation: Orientation) -> Rect {
+    fn with_labels(&self, task: PartTask<'_>) -> Rect {
         let block = Rect::new(0.0, 0.0, self.size.w, self.size.h);
-        let labels = self.labels(plan, part, orientation);
+        let labels = self.labels(task);
         labels.fold(block, |all, label| all.union(&label))
     }
 
     /// The places that labels take: where they are placed, else probably above lines to the right and beside lines down.
-    fn labels<'a>(
-        &'a self,
-        plan: &'a Plan,
-        part: &'a Component,
-        orientation: Orientation,
-    ) -> impl Iterator<Item = Rect> + 'a {
-        let labels = part.links.iter().zip(&self.routes);
+    fn labels<'a>(&'a self, task: PartTask<'a>) -> impl Iterator<Item = Rect> + 'a {
+        let label = move |(&i, route): (&usize, &Route)| {
+            let size = task.plan.links[i].label?;
+            if let Some(middle) = route.label {
+                return Some(Rect::around(middle, size));
+            }
+            let line = Rect::of_points(route.points())?;
+            let middle = line.centre();
+            let (x, y) = match task.orientation {
+                Orientation::LeftRight => (middle.x - size.w / 2.0, line.y - size.h),
+                Orientation::TopBottom => (line.right(), middle.y - size.h / 2.0),
+            };
+            Some(Rect::new(x, y, size.w, size.h))
+        };
+        let labels = task.part.links.iter().zip(&self.routes);
         labels
-            .filter(|_| plan.is_labelled)
-            .filter_map(move |(&i, route)| {
-                let size = plan.links[i].label?;
-                if let Some(middle) = route.label {
-                    return Some(Rect::around(middle, size));
-                }
-                let line = Rect::of_points(route.points())?;
-                let middle = line.centre();
-                Some(match orientation {
-                    Orientation::LeftRight => {
-                        Rect::new(middle.x - size.w / 2.0, line.y - size.h, size.w, size.h)
-                    }
-                    Orientation::TopBottom => {
-                        Rect::new(line.right(), middle.y - size.h / 2.0, size.w, size.h)
-                    }
-                })
-            })
+            .filter(move |_| task.plan.is_labelled)
+            .filter_map(label)
     }
 
     /// The places that its boxes, frames, lines and labels take.
-    fn taken(&self, plan: &Plan, part: &Component, orientation: Orientation) -> Vec<Rect> {
+    fn taken(&self, task: PartTask<'_>) -> Vec<Rect> {
         let pieces = self.routes.iter().flat_map(|route| {
             let starts = route.curves.iter().map(|curve| curve[2]);
             let starts = std::iter::once(route.start).chain(starts);
@@ -523,8 +501,7 @@ impl PlacedPart {
                 .filter_map(|(start, curve)| Rect::of_points(std::iter::once(start).chain(*curve)))
         });
         let solid = self.boxes.iter().chain(&self.clusters).copied();
-        let labels = self.labels(plan, part, orientation);
-        solid.chain(pieces).chain(labels).collect()
+        solid.chain(pieces).chain(self.labels(task)).collect()
     }
 }
 
@@ -532,21 +509,25 @@ impl PlacedPart {
 pub(crate) fn assembled(
     plan: &Plan,
     options: &LayoutOptions,
-    parts: &[Component],
-    blocks: Vec<PlacedPart>,
+    blocks: Vec<(&Component, PlacedPart)>,
     orientation: Orientation,
 ) -> (u64, Layout) {
-    let bounds = parts.iter().zip(&blocks);
-    let bounds: Vec<Rect> = bounds
-        .map(|(part, block)| block.with_labels(plan, part, orientation))
-        .collect();
+    let task = |part| PartTask {
+        plan,
+        options,
+        part,
+        orientation,
+    };
+    let bounds = blocks.iter();
+    let bounds = bounds.map(|(part, block)| block.with_labels(task(part)));
+    let bounds: Vec<Rect> = bounds.collect();
     let sizes: Vec<Size> = bounds.iter().map(|b| Size::new(b.w, b.h)).collect();
     let (mut corners, mut size) = pack::pack(&sizes, options.page, PART_GAP);
-    if (2..=MOST_NESTED).contains(&parts.len()) && plan.links.len() <= MANY {
-        let taken = parts.iter().zip(&blocks).zip(&bounds);
+    if (2..=MOST_NESTED).contains(&blocks.len()) && plan.links.len() <= MANY {
+        let taken = blocks.iter().zip(&bounds);
         let taken = taken.map(|((part, block), bounds)| {
             let corner = Point::new(-bounds.x, -bounds.y);
-            let taken = block.taken(plan, part, orientation).into_iter();
+            let taken = block.taken(task(part)).into_iter();
             taken.map(|rect| rect.moved(corner)).collect()
         });
         let shapes: Vec<Vec<Rect>> = taken.collect();
@@ -555,7 +536,7 @@ pub(crate) fn assembled(
             (corners, size) = nested;
         }
     }
-    let crossings = blocks.iter().map(|block| block.crossings).sum();
+    let crossings = blocks.iter().map(|(_, block)| block.crossings).sum();
     let mut layout = Layout {
         orientation,
         size,
@@ -564,7 +545,7 @@ pub(crate) fn assembled(
         clusters: vec![Rect::default(); plan.clusters.len()],
         ..Layout::default()
     };
-    for (((part, block), corner), bounds) in parts.iter().zip(blocks).zip(corners).zip(bounds) {
+    for (((part, block), corner), bounds) in blocks.iter().zip(corners).zip(bounds) {
         let corner = Point::new(corner.x - bounds.x, corner.y - bounds.y);
         for (&v, at) in part.vertices.iter().zip(&block.boxes) {
             layout.boxes[v] = at.moved(corner);

@@ -21,7 +21,7 @@ use super::layered::{acyclic, labels, order, parts, rank};
 use super::layers::{Lane, cut};
 use super::spacing::{Spacing, turned};
 use super::{
-    Component, Engine, LayerItem, LayerRows, Layers, Layout, LayoutOptions, Orientation, Plan,
+    Engine, LayerItem, LayerRows, Layers, Layout, LayoutOptions, Orientation, PartTask, Plan,
 };
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Rect, Size};
@@ -30,7 +30,7 @@ use crate::base::geometry::{Rect, Size};
 const MOST: usize = 150;
 /// The number of edges that the search for a good order may sweep, per part.
 const EFFORT: usize = 20_000;
-/// The space around boxes, and around edges: along, across.
+/// The space around boxes, and around edges: along, for labels and heads, and across.
 const BOX_HALO: Size = Size::new(50.0, 14.0);
 const EDGE_HALO: Size = Size::new(10.0, 7.0);
 
@@ -81,17 +81,22 @@ fn lay_out(plan: &Plan, options: &LayoutOptions, orientation: Orientation) -> Re
         link.fork = None;
     }
     let parts = parts::parts(&flat);
-    let blocks: Option<Vec<PlacedPart>> = parts
-        .iter()
-        .map(|part| block(&flat, options, part, orientation))
-        .collect();
-    let blocks = blocks.ok_or_else(|| {
+    let blocks = parts.iter().map(|part| {
+        let task = PartTask {
+            plan: &flat,
+            options,
+            part,
+            orientation,
+        };
+        Some((part, block(task)?))
+    });
+    let blocks = blocks.collect::<Option<Vec<_>>>().ok_or_else(|| {
         Error::usage(
             "layout-rs placed boxes on top of each other",
             "use `--layout layered`",
         )
     })?;
-    let (_, mut layout) = assembled(&flat, options, &parts, blocks, orientation);
+    let (_, mut layout) = assembled(&flat, options, blocks, orientation);
     layout.clusters = vec![Rect::default(); plan.clusters.len()];
     labels::place(&flat, &mut layout);
     if !plan.clusters.is_empty() {
@@ -103,35 +108,27 @@ fn lay_out(plan: &Plan, options: &LayoutOptions, orientation: Orientation) -> Re
 }
 
 /// One part placed and routed; `None` if its boxes overlap.
-fn block(
-    plan: &Plan,
-    options: &LayoutOptions,
-    part: &Component,
-    orientation: Orientation,
-) -> Option<PlacedPart> {
+fn block(task: PartTask<'_>) -> Option<PlacedPart> {
+    let part = task.part;
     let n = part.vertices.len();
     let reversed = acyclic::in_order(n, &part.ends);
-    let layers = cut(
-        plan,
-        part,
-        &rank::ranks(n, &rank::turned(&part.ends, &reversed)),
-        Lane::Outside,
-    );
-    let (rows, crossings) = order::order(&layers, EFFORT);
-    let room = Spacing::new(plan, options, part, &layers, orientation);
-    let places = places(&layers, &rows, &room, orientation);
+    let ranks = rank::ranks(n, &rank::turned(&part.ends, &reversed));
+    let layers = cut(task.plan, part, &ranks, Lane::Outside);
+    let order::LayerOrder { rows, crossings } = order::order(&layers, EFFORT);
+    let room = Spacing::new(task, &layers);
+    let places = places(&layers, &rows, &room, task.orientation);
     let across: Vec<f64> = places.iter().map(|&(_, across)| across).collect();
     let columns: Vec<(f64, f64)> = rows
         .iter()
         .map(|row| column(row, &layers, &room, &places))
         .collect();
-    let part = routed(plan, part, &room, &across, &columns);
+    let part = routed(task, &room, &across, &columns);
     let is_clear = |(v, own): (usize, &Rect)| part.boxes[..v].iter().all(|b| !b.overlaps(own));
     part.boxes
         .iter()
         .enumerate()
         .all(is_clear)
-        .then(|| PlacedPart { crossings, ..part }.on_page(orientation))
+        .then(|| PlacedPart { crossings, ..part }.on_page(task.orientation))
 }
 
 /// The middle of each item: along, across.

@@ -7,14 +7,15 @@ use std::collections::BTreeMap;
 use crate::base::geometry::{Point, Rect, Size};
 use crate::layout::routes::{PORT_STEP, PORTS};
 use crate::layout::{
-    Component, LayerItem, LayerRows, Layers, LayoutOptions, Link, Orientation, Plan, first_bend,
-    include,
+    LayerItem, LayerRows, Layers, Link, Orientation, PartTask, Plan, first_bend, include,
 };
 
-/// The space between boxes side by side, between edges side by side, and between an edge and anything else.
+/// The space between boxes side by side, and between edges side by side and an edge and anything else: the heads
+/// of two arrows side by side are 6 pixels wide and must not touch.
 const BOX_GAP: f64 = 12.0;
 const EDGE_GAP: f64 = 7.0;
-/// The space between a cluster's border and its contents, and outside of it.
+/// The space between a cluster's border and its contents, and outside of it: as between edges, one of which may
+/// run along it.
 pub(crate) const PADDING: f64 = 7.0;
 /// How much higher a box may become for the edges at its sides: the heads of four lines are apart on a box of one line, and
 /// it still looks like the others.
@@ -22,14 +23,14 @@ const MOST_GROWN: f64 = 2.0;
 /// The space below a title for the heads of arrows from above: the title is painted over their lines.
 const HEAD: f64 = 9.0;
 const MARGIN: f64 = 4.0;
-/// The space before and after a label between two layers.
+/// The space before and after a label between two layers: its edge is seen on both sides.
 const LABEL_GAP: f64 = 12.0;
 /// The space that the first self loop takes beside its vertex, and each further one.
 const LOOP: (f64, f64) = (14.0, 6.0);
 
 /// The space between a label and its edge.
 const ASIDE: f64 = 4.0;
-/// The space that edges need to bend twice, as a fraction of the space to bend once.
+/// The space that edges need to bend twice, as a fraction of the space to bend once: the bends are half as far across.
 const TWICE: f64 = 0.45;
 
 /// The bend beside which the label of an edge is placed: about the middle one, in a layer without boxes; for
@@ -72,13 +73,13 @@ pub(crate) struct Spacing<'a> {
 }
 
 impl<'a> Spacing<'a> {
-    pub(crate) fn new(
-        plan: &Plan,
-        options: &LayoutOptions,
-        part: &Component,
-        layers: &'a Layers,
-        orientation: Orientation,
-    ) -> Self {
+    pub(crate) fn new(task: PartTask<'_>, layers: &'a Layers) -> Self {
+        let PartTask {
+            plan,
+            part,
+            orientation,
+            ..
+        } = task;
         let mut loops = vec![0; part.vertices.len()];
         for &(from, _) in part.ends.iter().filter(|(from, to)| from == to) {
             loops[from] += 1;
@@ -118,7 +119,7 @@ impl<'a> Spacing<'a> {
             loops,
             label,
             worded,
-            below_title: if options.is_tight { 0.0 } else { HEAD },
+            below_title: if task.options.is_tight { 0.0 } else { HEAD },
             footer: std::iter::once((0.0, 0.0))
                 .chain(part.clusters.iter().map(footer))
                 .collect(),

@@ -2,10 +2,9 @@
 //!
 //! In: the elements and the history of a mission. Out: an [`EventLog`], which all outputs read that show a change (badges,
 //! captions, marks, tables, pages), and its text. Begin with `make`, which calls one file per kind of event and then `causes`,
-//! which leaves one headline per cause; `changes` relates events to windows, `written` and `sentence` print the log.
+//! which leaves one headline per cause; `written` and `sentence` print the log.
 
 mod causes;
-mod changes;
 mod drafts;
 mod handovers;
 mod incidents;
@@ -20,15 +19,14 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use crate::base::ids::ids;
+use crate::base::ids::{grouped, ids};
 use crate::base::rhythm::{CLOSE_NS, SWITCH, SWITCH_NS};
 use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::{ById, Element, NodeId};
 
-pub(crate) use changes::{described, explain, from_changes, places};
-pub(crate) use drafts::{LogInput, sorted};
+pub(crate) use drafts::{LogInput, sorted, sorted_by};
 pub(crate) use sentence::{predicate, sentence, sentence_with};
 pub use written::{LogFormat, LogLine, LogOptions, log};
 pub(crate) use written::{LogRow, body, headlines, lines, quoted, row_lines, whole};
@@ -138,11 +136,13 @@ impl Kind {
 }
 
 /// The values of an event besides its kind and time.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[serde(untagged)]
 #[non_exhaustive]
-pub enum Detail {
+pub enum Detail<N = NodeId, V = Arc<str>> {
     /// No values.
     #[default]
+    #[serde(skip)]
     None,
     /// Messages per second before and after; both above 0.
     Rates {
@@ -154,19 +154,46 @@ pub enum Detail {
     /// The senders before and after, sorted.
     Senders {
         /// The senders before.
-        from: Vec<NodeId>,
+        from: Vec<N>,
         /// The senders after.
-        to: Vec<NodeId>,
+        to: Vec<N>,
     },
     /// A number of messages that were lost, or of times that an element appears.
-    Count(u64),
+    Count {
+        /// The number.
+        count: u64,
+    },
     /// A value before and after; empty for none.
     Values {
         /// The value before.
-        from: Arc<str>,
+        from: V,
         /// The value after.
-        to: Arc<str>,
+        to: V,
     },
+}
+
+impl<N, V> Detail<N, V> {
+    /// The same values with other names for nodes and texts; `None` if a node has none.
+    pub(crate) fn mapped<'a, M, W>(
+        &'a self,
+        node: impl Fn(&'a N) -> Option<M>,
+        text: impl Fn(&'a V) -> W,
+    ) -> Option<Detail<M, W>> {
+        let nodes = |all: &'a [N]| all.iter().map(&node).collect::<Option<Vec<M>>>();
+        Some(match self {
+            Self::None => Detail::None,
+            &Self::Rates { from_hz, to_hz } => Detail::Rates { from_hz, to_hz },
+            Self::Senders { from, to } => {
+                let (from, to) = (nodes(from)?, nodes(to)?);
+                Detail::Senders { from, to }
+            }
+            &Self::Count { count } => Detail::Count { count },
+            Self::Values { from, to } => {
+                let (from, to) = (text(from), text(to));
+                Detail::Values { from, to }
+            }
+        })
+    }
 }
 
 /// An event.
@@ -324,13 +351,8 @@ impl EventLog {
 
     /// The ids of the parts of all events, in order, by the ids of those events.
     pub fn all_parts(&self) -> Parts {
-        let mut parts = Parts::new();
-        for (id, event) in self.events.with_ids() {
-            if let Some(whole) = event.part_of {
-                parts.entry(whole).or_default().push(id);
-            }
-        }
-        parts
+        let events = self.events.with_ids();
+        grouped(events.filter_map(|(id, event)| Some((event.part_of?, id))))
     }
 
     /// The parts of an event, in order.

@@ -19,9 +19,9 @@ use crate::gate::{
     DiffSubject, Difference, Expectation, ReportFormat, Runs, Side, Subject, Verdict, differences,
     judge, pairs, union, update, write,
 };
-use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::Length;
 use crate::mission::Mission;
+use crate::mission::RATE_CHANGE;
 
 /// One report of a check or a comparison, to write to a file.
 #[derive(Clone, Debug)]

@@ -7,6 +7,7 @@ use super::Reading;
 use crate::bag::moved::Moved;
 use crate::bag::{self, Connection, ConnectionId, Input, OpenOptions, Reader, Sink, Want};
 use crate::base::error::{Error, Result};
+use crate::base::ids::grouped;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
 
@@ -124,12 +125,9 @@ fn refuse_copies(inputs: &[Input]) -> Result<()> {
         open(input)?.read(None, &mut sink).ok()?;
         (sink.messages > 0).then_some((sink.messages, sink.sum))
     };
-    let mut alike: BTreeMap<_, Vec<&Input>> = BTreeMap::new();
-    if near.len() > 1 {
-        for input in near {
-            alike.entry(ends(input)).or_default().push(input);
-        }
-    }
+    let are_several = near.len() > 1;
+    let near = near.into_iter().filter(|_| are_several);
+    let alike = grouped(near.map(|input| (ends(input), input)));
     for inputs in alike.values().filter(|inputs| inputs.len() > 1) {
         let mut known = BTreeMap::new();
         for input in inputs {

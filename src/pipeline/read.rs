@@ -20,10 +20,11 @@ use crate::evidence::EvidenceLine;
 use crate::evidence::code::{self, SourceCode};
 use crate::evidence::collector::{self, Recorded};
 use crate::evidence::conclude::{self, Findings, conclude};
-use crate::graph::diff::RATE_CHANGE;
 use crate::graph::history::Sending;
 use crate::graph::window::{self, Cut, Division, Length, Windows};
 use crate::graph::{History, NodeId, Windowed, graphs, made, traffic, unread};
+use crate::mission::RATE_CHANGE;
+use crate::mission::changes;
 use crate::mission::event_log::{self, EventLog, Interruption, InterruptionKind};
 use crate::mission::{Mission, Window, read_json};
 
@@ -392,7 +393,7 @@ fn log_of(history: &History, collected: &Collected, reading: &Reading) -> Result
 
 /// The windows, and the changes from each to the next.
 fn list(windows: &Windows, windowed: &Windowed, history: &History, log: &EventLog) -> Vec<Window> {
-    let changes = event_log::explain(&windowed.graphs, &history.elements, log);
+    let changes = changes::explain(&windowed.graphs, &history.elements, log);
     let window = |(index, (messages, (changes, events)))| Window {
         index,
         span: windows.spans[index],

@@ -6,7 +6,7 @@ use std::mem::discriminant;
 
 use super::items::Viewed;
 use super::state::LivingItems;
-use super::{Frame, Headline, ItemKind, Lasting, Phrase};
+use super::{Frame, Headline, ItemKind, OngoingEvent, Phrase};
 use crate::base::name::{ShortNames, is_quiet};
 use crate::base::time::Stamp;
 use crate::base::words;
@@ -94,8 +94,8 @@ impl<'a> CaptionWriter<'a> {
                 }
             }
         }
-        for lasting in &frame.lasting {
-            self.lasting(lasting).add(&mut groups, lasting.event);
+        for ongoing in &frame.ongoing {
+            self.ongoing(ongoing).add(&mut groups, ongoing.event);
         }
         frame.caption = groups.into_values().map(plural).collect();
         frame.note = self.note(frame, after);
@@ -113,7 +113,7 @@ impl<'a> CaptionWriter<'a> {
             return none.unwrap_or_default().to_owned();
         }
         let begun = frame.headlines.iter().map(|h| h.time);
-        let times = begun.chain(frame.lasting.iter().filter_map(|l| l.ended));
+        let times = begun.chain(frame.ongoing.iter().filter_map(|l| l.ended));
         let span = times.fold(None, |span: Option<(Stamp, Stamp)>, at| {
             Some(span.map_or((at, at), |(a, b)| (a.min(at), b.max(at))))
         });
@@ -136,11 +136,11 @@ impl<'a> CaptionWriter<'a> {
             } else {
                 format!("{first} – {last}")
             });
-        } else if let [one] = &frame.lasting[..] {
+        } else if let [one] = &frame.ongoing[..] {
             parts.push(format!("since {}", self.moment(one.since)));
         }
         let leaves = frame.headlines.iter().filter(|h| h.leaves);
-        let away = frame.lasting.iter().filter(|l| l.ended.is_none());
+        let away = frame.ongoing.iter().filter(|l| l.ended.is_none());
         let mut whats = leaves.map(|h| h.what).chain(away.map(|l| l.what));
         parts.extend(whats.find_map(|what| self.missed(what, after)));
         parts.retain(|part| !part.is_empty());
@@ -195,12 +195,12 @@ impl<'a> CaptionWriter<'a> {
     }
 
     /// An event of an earlier window in this one.
-    fn lasting(&self, lasting: &Lasting) -> Said {
-        let name = self.name(lasting.what);
-        match lasting.ended {
+    fn ongoing(&self, ongoing: &OngoingEvent) -> Said {
+        let name = self.name(ongoing.what);
+        match ongoing.ended {
             None => Said::new(12, ' ', name, STILL_AWAY),
             Some(end) => {
-                let away = words::duration(end.since(lasting.since));
+                let away = words::duration(end.since(ongoing.since));
                 Said::new(6, ' ', name, &format!("back after {away}"))
             }
         }

@@ -3,13 +3,12 @@
 use super::ViewOptions;
 use super::items::Viewed;
 use super::state::shows_node;
-use crate::graph::diff::Change;
 use crate::graph::history::{Sender, Sending};
 use crate::graph::{
     ById, Edge, Element, ElementState, Elements, Graph, Id, NodeId, PerElement, TopicId,
 };
 use crate::mission::event_log::{Detail, Event};
-use crate::mission::{EventId, EventLog, Mission, Window};
+use crate::mission::{Change, EventId, EventLog, Mission, Window};
 
 /// The mission without the elements that the view omits. Topics in groups and elements inside collapsed
 /// namespaces are visible, so they stay, under their own names; changes stay as they were found in the whole
@@ -73,13 +72,7 @@ impl Keep {
             Some(Event {
                 what: self.element(event.what)?,
                 part_of: event.part_of.and_then(|whole| self.event(whole)),
-                detail: match &event.detail {
-                    Detail::Senders { from, to } => Detail::Senders {
-                        from: self.kept_nodes(from),
-                        to: self.kept_nodes(to),
-                    },
-                    other => other.clone(),
-                },
+                detail: self.detail(&event.detail),
                 ..event.clone()
             })
         });
@@ -98,8 +91,16 @@ impl Keep {
         }
     }
 
-    fn kept_nodes(&self, nodes: &[NodeId]) -> Vec<NodeId> {
-        nodes.iter().filter_map(|id| self.node(*id)).collect()
+    /// The values of an event without the nodes that do not stay.
+    fn detail(&self, detail: &Detail) -> Detail {
+        let kept = |nodes: &[NodeId]| nodes.iter().filter_map(|id| self.node(*id)).collect();
+        match detail {
+            Detail::Senders { from, to } => {
+                let (from, to) = (kept(from), kept(to));
+                Detail::Senders { from, to }
+            }
+            other => other.clone(),
+        }
     }
 
     fn elements(&self, all: &Elements) -> Elements {
@@ -171,19 +172,11 @@ impl Keep {
     }
 
     fn change(&self, change: &Change) -> Option<Change> {
-        let mut change = change.clone();
-        match &mut change {
-            Change::Added { what, .. }
-            | Change::Removed { what, .. }
-            | Change::Rate { what, .. }
-            | Change::Value { what, .. } => *what = self.element(*what)?,
-            Change::HandedOver { topic, from, to } => {
-                *topic = self.topic(*topic)?;
-                (*from, *to) = (self.kept_nodes(from), self.kept_nodes(to));
-            }
-            Change::Restarted { node, .. } => *node = self.node(*node)?,
-        }
-        Some(change)
+        Some(Change {
+            what: self.element(change.what)?,
+            detail: self.detail(&change.detail),
+            ..change.clone()
+        })
     }
 
     fn element(&self, element: Element) -> Option<Element> {

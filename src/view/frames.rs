@@ -3,11 +3,11 @@
 use super::caption::{CaptionWriter, STILL_AWAY};
 use super::items::Viewed;
 use super::listed::beginning;
-use super::marked::{LastingEvents, WindowChanges, WindowMarks};
-use super::shown::{Looks, LooksWriter};
+use super::marked::{OngoingEvents, WindowChanges, WindowMarks};
+use super::shown::{ShownRuns, ShownRunsWriter};
 use super::state::{Alive, Lifetimes, LivingItems, Now};
 use super::steady::{Lengths, stable};
-use super::{ArrowId, Counts, ItemId, Lasting, Mark, MemberState, Shown, ViewOptions};
+use super::{ArrowId, Counts, ItemId, Mark, MemberState, OngoingEvent, Shown, ViewOptions};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{ById, Element, Id};
 use crate::mission::event_log::{EventId, Kind, Parts};
@@ -17,8 +17,8 @@ use crate::mission::{Mission, Window};
 #[derive(Default)]
 pub(crate) struct Frames {
     pub(crate) list: Vec<Frame>,
-    pub(crate) items: ById<ItemId, Looks>,
-    pub(crate) arrows: ById<ArrowId, Looks>,
+    pub(crate) items: ById<ItemId, ShownRuns>,
+    pub(crate) arrows: ById<ArrowId, ShownRuns>,
 }
 
 /// The windows one after the other. In windows without headlines, only elements whose numbers changed are
@@ -43,7 +43,7 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed<'
             messages: window.messages,
             counts: Counts::of(&headlines),
             headlines,
-            lasting: windows.changes.marks.lasting.clone(),
+            ongoing: windows.changes.marks.ongoing.clone(),
             member_lists: windows.member_lists.clone(),
             ..Frame::empty(window.index, window.span)
         };
@@ -130,29 +130,29 @@ struct ShownWindows<'a> {
     viewed: &'a Viewed<'a>,
     lives: Lifetimes<'a>,
     parts: Parts,
-    lasting: LastingEvents<'a>,
+    ongoing: OngoingEvents<'a>,
     /// A beginning before this time is not a change.
     beginning: Option<Stamp>,
     now: Now<'a>,
     changes: WindowChanges,
     member_lists: Vec<Vec<MemberState>>,
-    items: LooksSoFar<ItemId>,
-    arrows: LooksSoFar<ArrowId>,
+    items: ShownSoFar<ItemId>,
+    arrows: ShownSoFar<ArrowId>,
 }
 
 /// The items, or the arrows: the looks of each so far.
 #[derive(Default)]
-struct LooksSoFar<I> {
-    shown: ById<I, LooksWriter>,
+struct ShownSoFar<I> {
+    shown: ById<I, ShownRunsWriter>,
     /// The ids of those with other numbers than in the previous window.
     touched: Vec<I>,
     is_touched: ById<I, bool>,
 }
 
-impl<I: Id> LooksSoFar<I> {
+impl<I: Id> ShownSoFar<I> {
     fn new<T>(all: &ById<I, T>) -> Self {
         Self {
-            shown: all.iter().map(|_| LooksWriter::default()).collect(),
+            shown: all.iter().map(|_| ShownRunsWriter::default()).collect(),
             touched: Vec::new(),
             is_touched: ById::like(all, false),
         }
@@ -180,7 +180,7 @@ impl<I: Id> LooksSoFar<I> {
         }
     }
 
-    fn finish(self, lengths: &Lengths) -> ById<I, Looks> {
+    fn finish(self, lengths: &Lengths) -> ById<I, ShownRuns> {
         let all = self.shown.into_iter();
         all.map(|raw| stable(&raw.finish(), lengths)).collect()
     }
@@ -193,13 +193,13 @@ impl<'a> ShownWindows<'a> {
             viewed,
             lives: Lifetimes::new(mission),
             parts: mission.log.all_parts(),
-            lasting: LastingEvents::new(&mission.log, viewed),
+            ongoing: OngoingEvents::new(&mission.log, viewed),
             beginning: beginning(mission),
             now: Now::new(mission, options, viewed),
             changes: WindowChanges::default(),
             member_lists: Vec::new(),
-            items: LooksSoFar::new(&viewed.items),
-            arrows: LooksSoFar::new(&viewed.arrows),
+            items: ShownSoFar::new(&viewed.items),
+            arrows: ShownSoFar::new(&viewed.arrows),
         }
     }
 
@@ -232,7 +232,7 @@ impl<'a> ShownWindows<'a> {
             marks: WindowMarks::new(
                 &self.mission.log,
                 (&self.parts, self.beginning),
-                (span, self.lasting.at(span)),
+                (span, self.ongoing.at(span)),
                 self.viewed,
             ),
         };
@@ -413,7 +413,7 @@ pub struct Frame {
     pub headlines: Vec<Headline>,
     /// The events of earlier windows that last into it or end in it: they are marked and in the headline, but
     /// counted only where they begin.
-    pub lasting: Vec<Lasting>,
+    pub ongoing: Vec<OngoingEvent>,
     /// The number of headlines of each kind.
     pub counts: Counts,
     /// The changes in words, the most important first; empty exactly if nothing is marked.
@@ -445,7 +445,7 @@ impl Frame {
 
     /// Whether an event begins or ends in it.
     pub fn is_changed(&self) -> bool {
-        !self.headlines.is_empty() || self.lasting.iter().any(|l| l.ended.is_some())
+        !self.headlines.is_empty() || self.ongoing.iter().any(|l| l.ended.is_some())
     }
 
     /// The time that its drawing shows.
@@ -455,8 +455,8 @@ impl Frame {
 
     /// The events that it reports: the ids of those that begin in it, and of those that last.
     pub fn events(&self) -> impl Iterator<Item = EventId> {
-        let lasting = self.lasting.iter().map(|l| l.event);
-        self.headlines.iter().map(|h| h.event).chain(lasting)
+        let ongoing = self.ongoing.iter().map(|l| l.event);
+        self.headlines.iter().map(|h| h.event).chain(ongoing)
     }
 
     /// The caption in at most `most` phrases of three names each, the rest counted: `− a stops; + b starts; +3`.

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::choose::{Selection, is_infrastructure};
 use super::fold::namespaces::{clusters, headlines};
 use super::fold::{self, ItemKey, Keys};
-use super::{AlsoHere, ArrowId, Item, ItemId, ItemKind, Looks, Namespace, View, ViewOptions};
+use super::{AlsoHere, ArrowId, Item, ItemId, ItemKind, Namespace, ShownRuns, View, ViewOptions};
 use crate::base::name::lies_in;
 use crate::base::time::Stamp;
 use crate::graph::window::default_period;
@@ -247,7 +247,7 @@ pub(crate) fn changed(mission: &Mission) -> impl Iterator<Item = &Event> {
 /// These nodes with their looks, by the innermost namespace with a box.
 pub(crate) fn also_here(
     items: impl IntoIterator<Item = Item>,
-    shown: impl IntoIterator<Item = Looks>,
+    shown: impl IntoIterator<Item = ShownRuns>,
     namespaces: &[Namespace],
 ) -> Vec<AlsoHere> {
     let mut also: BTreeMap<Option<usize>, AlsoHere> = BTreeMap::new();

@@ -35,7 +35,7 @@ impl Changed {
 #[derive(Default)]
 pub(crate) struct WindowMarks {
     pub(crate) headlines: Vec<Headline>,
-    pub(crate) lasting: Vec<Lasting>,
+    pub(crate) ongoing: Vec<OngoingEvent>,
     pub(crate) items: BTreeMap<ItemId, Changed>,
     pub(crate) arrows: BTreeMap<ArrowId, Changed>,
 }
@@ -47,16 +47,16 @@ impl WindowMarks {
     pub(crate) fn new(
         log: &EventLog,
         (parts, beginning): (&Parts, Option<Stamp>),
-        (span, lasting): (Span, Vec<Lasting>),
+        (span, ongoing): (Span, Vec<OngoingEvent>),
         viewed: &Viewed<'_>,
     ) -> Self {
         let mut changed = Self::default();
-        for last in &lasting {
+        for last in &ongoing {
             if let Some(event) = log.events.get(last.event) {
                 changed.report(viewed, event, last.event, last.part());
             }
         }
-        changed.lasting = lasting;
+        changed.ongoing = ongoing;
         for (id, event) in log.headlines(span) {
             let is_start = matches!(event.kind, Kind::Started | Kind::Appeared);
             let is_first = is_start && beginning.is_some_and(|end| event.time < end);
@@ -383,7 +383,7 @@ fn marked(shown: Shown, there: (bool, bool), reported: Option<&Changed>) -> Opti
 ///
 /// A silence without evidence of an absence is only listed where it ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lasting {
+pub struct OngoingEvent {
     /// Its index in the event log.
     pub event: EventId,
     /// The element it is about.
@@ -415,7 +415,7 @@ impl Part {
     }
 }
 
-impl Lasting {
+impl OngoingEvent {
     pub(crate) fn part(&self) -> Part {
         if self.ended.is_some() {
             Part::Back
@@ -426,7 +426,7 @@ impl Lasting {
 }
 
 /// The events that last, from window to window.
-pub(crate) struct LastingEvents<'a> {
+pub(crate) struct OngoingEvents<'a> {
     /// Those with an end, in the order of their beginnings.
     all: Vec<(EventId, &'a Event)>,
     /// The first of them that begins in or after the present window.
@@ -435,7 +435,7 @@ pub(crate) struct LastingEvents<'a> {
     open: Vec<usize>,
 }
 
-impl<'a> LastingEvents<'a> {
+impl<'a> OngoingEvents<'a> {
     pub(crate) fn new(log: &'a EventLog, viewed: &Viewed<'_>) -> Self {
         let lasts = |event: &Event| {
             event.until.is_some_and(|until| until > event.time)
@@ -451,7 +451,7 @@ impl<'a> LastingEvents<'a> {
     }
 
     /// Those that last into a window or end in it. Windows are in the order of their starts.
-    pub(crate) fn at(&mut self, window: Span) -> Vec<Lasting> {
+    pub(crate) fn at(&mut self, window: Span) -> Vec<OngoingEvent> {
         let begun = |at: usize| self.all.get(at).is_some_and(|e| e.1.time < window.start);
         while begun(self.next) {
             self.open.push(self.next);
@@ -460,17 +460,17 @@ impl<'a> LastingEvents<'a> {
         let all = &self.all;
         let end = |at: usize| all[at].1.until.unwrap_or(window.start);
         self.open.retain(|at| end(*at) >= window.start);
-        let lasting = self.open.iter().filter_map(|at| {
+        let ongoing = self.open.iter().filter_map(|at| {
             let (id, event) = all[*at];
             let ended = Some(end(*at)).filter(|end| *end < window.end);
             let is_reported = ended.is_some() || event.kind == Kind::Restarted;
-            is_reported.then_some(Lasting {
+            is_reported.then_some(OngoingEvent {
                 event: id,
                 what: event.what,
                 since: event.time,
                 ended,
             })
         });
-        lasting.collect()
+        ongoing.collect()
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::{Item, ItemId, Looks, Shown, View};
+use super::{Item, ItemId, Shown, ShownRuns, View};
 use crate::base::name::namespace;
 use crate::graph::{ById, Id as _};
 
@@ -79,7 +79,7 @@ impl View {
 impl View {
     /// The view with the rates that changed, but no others, for narrow drawings.
     pub(crate) fn without_rates(&self) -> Self {
-        let unrated = |looks: &Looks| {
+        let unrated = |looks: &ShownRuns| {
             let each = (0..self.frames.len()).map(|k| {
                 let mut shown = looks.at(k)?.clone();
                 (shown.hz, shown.held, shown.count) = (None, None, None);
@@ -89,7 +89,7 @@ impl View {
                 Some(shown)
             });
             let each: Vec<Option<Shown>> = each.collect();
-            Looks::of(each.iter().map(Option::as_ref))
+            ShownRuns::of(each.iter().map(Option::as_ref))
         };
         Self {
             items_shown: self.items_shown.iter().map(unrated).collect(),
@@ -100,13 +100,13 @@ impl View {
 }
 
 /// Each of these looks as that of the only window, under its new id.
-fn alone<'a, I: crate::graph::Id>(all: impl Iterator<Item = &'a Shown>) -> ById<I, Looks> {
+fn alone<'a, I: crate::graph::Id>(all: impl Iterator<Item = &'a Shown>) -> ById<I, ShownRuns> {
     let looks = all.zip(0_u32..).map(|(shown, id)| {
         let shown = Shown {
             id,
             ..shown.clone()
         };
-        Looks::of([Some(&shown)])
+        ShownRuns::of([Some(&shown)])
     });
     looks.collect()
 }

@@ -1,19 +1,20 @@
 //! Notices about what the picture leaves out, about options that match nothing, and the error of a view that shows nothing.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::choose::{Reason, is_params, is_tf};
 use super::items::Viewed;
 use super::{Hide, NameFilter, ViewOptions};
 use crate::base::error::Error;
+use crate::base::ids::grouped;
 use crate::base::name::{is_within, namespace};
 use crate::base::nearest::nearest;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words;
 use crate::graph::{Elements, Topic};
 
-/// The largest number of names given as examples.
+/// The largest number of names given as examples: a notice is one line of a terminal.
 const EXAMPLES: usize = 3;
 
 /// One notice per reason for hiding, with the number of elements hidden. Grouped and collapsed elements are seen as
@@ -21,12 +22,8 @@ const EXAMPLES: usize = 3;
 pub(crate) fn notes(elements: &Elements, viewed: &Viewed<'_>, options: &ViewOptions) -> Notices {
     let selection = &viewed.selection;
     let reasons = selection.nodes.iter().chain(&selection.topics);
-    let mut hidden: BTreeMap<Reason, Vec<&str>> = BTreeMap::new();
-    for (name, reason) in names(elements).into_iter().flatten().zip(reasons) {
-        if let Some(reason) = reason {
-            hidden.entry(*reason).or_default().push(name);
-        }
-    }
+    let reasoned = reasons.zip(names(elements).into_iter().flatten());
+    let hidden = grouped(reasoned.filter_map(|(reason, name)| Some(((*reason)?, name))));
     let mut notices = Notices::new();
     for (reason, mut names) in hidden {
         names.sort_unstable();

@@ -302,7 +302,7 @@ impl TopicRow {
 
 /// The looks of one item or arrow, window by window.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Looks {
+pub struct ShownRuns {
     /// Each look only once unless it is marked.
     distinct: Vec<Shown>,
     /// The index of the look, or [`AWAY`].
@@ -312,7 +312,7 @@ pub struct Looks {
 /// The index that means absence.
 const AWAY: u32 = u32::MAX;
 
-impl Looks {
+impl ShownRuns {
     /// The look in a window; `None` if it is absent.
     pub fn at(&self, window: usize) -> Option<&Shown> {
         let look = self.runs.at(u32::try_from(window).unwrap_or(u32::MAX))?;
@@ -352,7 +352,7 @@ impl Looks {
         look: impl Fn(usize) -> Option<Shown>,
     ) -> Self {
         let windows: BTreeSet<u32> = all.flat_map(Self::runs).map(|run| run.0).collect();
-        let mut writer = LooksWriter::default();
+        let mut writer = ShownRunsWriter::default();
         for window in windows {
             writer.show(window, look(window as usize));
         }
@@ -361,7 +361,7 @@ impl Looks {
 
     /// The looks in the windows of a sequence, one event per window.
     pub fn of<'a>(windows: impl IntoIterator<Item = Option<&'a Shown>>) -> Self {
-        let mut writer = LooksWriter::default();
+        let mut writer = ShownRunsWriter::default();
         for (window, shown) in (0..).zip(windows) {
             writer.show(window, shown.cloned());
         }
@@ -371,8 +371,8 @@ impl Looks {
 
 /// A writer that adds looks in order of the windows.
 #[derive(Debug, Default)]
-pub(super) struct LooksWriter {
-    looks: Looks,
+pub(super) struct ShownRunsWriter {
+    looks: ShownRuns,
     /// The indices of looks without a mark, if there are more than [`FEW`] looks.
     places: BTreeMap<LookKey, u32>,
 }
@@ -390,7 +390,7 @@ type LookKey = (
     Option<Arc<str>>,
 );
 
-impl LooksWriter {
+impl ShownRunsWriter {
     /// Adds the look from this window on; `None` if it is absent.
     pub(super) fn show(&mut self, window: u32, shown: Option<Shown>) {
         let place = shown.map_or(AWAY, |shown| self.look(shown));
@@ -436,7 +436,7 @@ impl LooksWriter {
         self.looks.runs.push(window, place, AWAY);
     }
 
-    pub(super) fn finish(mut self) -> Looks {
+    pub(super) fn finish(mut self) -> ShownRuns {
         self.looks.runs.0.shrink_to_fit();
         self.looks.distinct.shrink_to_fit();
         self.looks
@@ -468,8 +468,8 @@ fn key(shown: &Shown) -> LookKey {
 
 /// The windows in which one of two looks differs from the previous window, with both looks.
 pub(crate) fn both<'a>(
-    a: &'a Looks,
-    b: &'a Looks,
+    a: &'a ShownRuns,
+    b: &'a ShownRuns,
 ) -> impl Iterator<Item = (Option<&'a Shown>, Option<&'a Shown>)> {
     let (mut next_a, mut next_b) = (a.runs().peekable(), b.runs().peekable());
     let (mut now_a, mut now_b) = (None, None);
@@ -509,7 +509,7 @@ mod tests {
             shown(1.0, None),
             None,
         ];
-        let looks = Looks::of(all.iter().map(Option::as_ref));
+        let looks = ShownRuns::of(all.iter().map(Option::as_ref));
         for (window, want) in all.iter().enumerate() {
             assert_eq!(looks.at(window), want.as_ref(), "{window}");
         }
@@ -520,7 +520,7 @@ mod tests {
     #[test]
     fn equal_looks_are_stored_once() {
         let all: Vec<_> = (0..100).map(|n| shown(f64::from(n % 20), None)).collect();
-        let looks = Looks::of(all.iter().map(Option::as_ref));
+        let looks = ShownRuns::of(all.iter().map(Option::as_ref));
         assert_eq!(looks.distinct().len(), 20);
         assert_eq!(looks.at(57), all[57].as_ref());
     }
@@ -529,15 +529,15 @@ mod tests {
     fn constant_elements_take_no_memory() {
         let (slow, fast) = (shown(1.0, None), shown(2.0, None));
         let all = (0..10_000).map(|n| if n < 5000 { &slow } else { &fast });
-        let looks = Looks::of(all.map(Option::as_ref));
+        let looks = ShownRuns::of(all.map(Option::as_ref));
         assert_eq!((looks.distinct().len(), looks.runs().count()), (2, 2));
     }
 
     #[test]
     fn two_series_of_looks_are_paired_by_window() {
         let (one, two) = (shown(1.0, None), shown(2.0, None));
-        let a = Looks::of([one.as_ref(), one.as_ref(), two.as_ref()]);
-        let b = Looks::of([None, one.as_ref(), one.as_ref()]);
+        let a = ShownRuns::of([one.as_ref(), one.as_ref(), two.as_ref()]);
+        let b = ShownRuns::of([None, one.as_ref(), one.as_ref()]);
         let hz = |shown: Option<&Shown>| shown.and_then(|s| s.hz);
         let reported: Vec<_> = both(&a, &b).map(|(a, b)| (hz(a), hz(b))).collect();
         let want = [(1.0, None), (1.0, Some(1.0)), (2.0, Some(1.0))];

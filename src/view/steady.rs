@@ -1,6 +1,6 @@
 //! The look of an element over several windows, without flicker from window to window.
 
-use super::shown::{Looks, LooksWriter};
+use super::shown::{ShownRuns, ShownRunsWriter};
 use super::{Mark, Shown};
 use crate::base::time::Span;
 use crate::evidence::Confidence;
@@ -45,7 +45,7 @@ struct PresentLife {
 }
 
 /// A look in some consecutive windows.
-struct LookRun<'a> {
+struct ShownRun<'a> {
     from: u32,
     to: u32,
     place: u32,
@@ -61,7 +61,7 @@ struct LookRun<'a> {
 ///
 /// A topic with a message per minute is also active in the seconds in between; only a pause in the event log
 /// is drawn as one.
-pub(crate) fn stable(raw: &Looks, lengths: &Lengths) -> Looks {
+pub(crate) fn stable(raw: &ShownRuns, lengths: &Lengths) -> ShownRuns {
     let mut runs = runs(raw, lengths.windows());
     let mut life = PresentLife::default();
     let mut last = 0;
@@ -88,9 +88,9 @@ pub(crate) fn stable(raw: &Looks, lengths: &Lengths) -> Looks {
     written(&runs, lengths.windows())
 }
 
-fn runs(raw: &Looks, windows: u32) -> Vec<LookRun<'_>> {
+fn runs(raw: &ShownRuns, windows: u32) -> Vec<ShownRun<'_>> {
     let runs = raw.spans(windows);
-    let runs = runs.map(|(from, to, place, shown)| LookRun {
+    let runs = runs.map(|(from, to, place, shown)| ShownRun {
         from,
         to,
         place,
@@ -103,7 +103,7 @@ fn runs(raw: &Looks, windows: u32) -> Vec<LookRun<'_>> {
 }
 
 impl PresentLife {
-    fn forward(&mut self, run: &mut LookRun<'_>, lengths: &Lengths) {
+    fn forward(&mut self, run: &mut ShownRun<'_>, lengths: &Lengths) {
         let shown = run.shown;
         if is_rate(shown) {
             (self.sent, self.idle, self.is_measured) = ((0.0, 0.0), 0.0, false);
@@ -139,7 +139,7 @@ impl PresentLife {
         self.show(run);
     }
 
-    fn backward(&mut self, run: &mut LookRun<'_>) {
+    fn backward(&mut self, run: &mut ShownRun<'_>) {
         if !run.shown.is_paused {
             self.look = self.look.or(Some(run.look));
         }
@@ -152,7 +152,7 @@ impl PresentLife {
         self.show(run);
     }
 
-    fn show(&self, run: &mut LookRun<'_>) {
+    fn show(&self, run: &mut ShownRun<'_>) {
         if let Some(look) = self.look.filter(|_| !run.shown.is_paused) {
             run.look = look;
         }
@@ -160,13 +160,13 @@ impl PresentLife {
 }
 
 /// The runs with their stable looks.
-fn written(runs: &[LookRun<'_>], windows: u32) -> Looks {
-    let mut writer = LooksWriter::default();
-    let look = |run: &LookRun<'_>| (run.look, run.steady_hz, run.held);
-    let is_same = |a: &LookRun<'_>, b: &LookRun<'_>| look(a) == look(b);
+fn written(runs: &[ShownRun<'_>], windows: u32) -> ShownRuns {
+    let mut writer = ShownRunsWriter::default();
+    let look = |run: &ShownRun<'_>| (run.look, run.steady_hz, run.held);
+    let is_same = |a: &ShownRun<'_>, b: &ShownRun<'_>| look(a) == look(b);
     // Between two changes only the numbers differ, and only a few of them.
     let mut places: Vec<Option<u32>> = Vec::new();
-    let mut before: Option<&LookRun<'_>> = None;
+    let mut before: Option<&ShownRun<'_>> = None;
     for run in runs {
         if before.is_none_or(|before| !is_same(before, run)) {
             places.clear();
@@ -245,7 +245,7 @@ mod tests {
         let shown: Vec<Shown> = counts.iter().map(shown).collect();
         let window = Span::new(Stamp(0), Stamp(10_000_000_000));
         let lengths = Lengths::new(counts.iter().map(|_| window));
-        let looks = stable(&Looks::of(shown.iter().map(Some)), &lengths);
+        let looks = stable(&ShownRuns::of(shown.iter().map(Some)), &lengths);
         let rate = |at| looks.at(at)?.written_rate().0;
         (0..counts.len()).filter_map(rate).collect()
     }
@@ -258,7 +258,7 @@ mod tests {
         });
         let window = Span::new(Stamp(0), Stamp(10_000_000_000));
         let lengths = Lengths::new(shown.iter().map(|_| window));
-        let looks = stable(&Looks::of(shown.iter().map(Some)), &lengths);
+        let looks = stable(&ShownRuns::of(shown.iter().map(Some)), &lengths);
         let steady = (0..5).map(|at| looks.at(at).unwrap().steady_hz);
         assert_eq!(steady.collect::<Vec<_>>(), [Some(5.0); 5]);
     }

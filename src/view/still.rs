@@ -8,14 +8,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::steady::Lengths;
 use super::{
-    Arrow, ArrowKind, Counts, Frame, Item, ItemId, Looks, Mark, Phrase, SeenWindow, Shown,
+    Arrow, ArrowKind, Counts, Frame, Item, ItemId, Mark, Phrase, SeenWindow, Shown, ShownRuns,
     TopicRow, View, sum as added,
 };
+use crate::base::ids::grouped;
 use crate::base::time::Span;
 use crate::base::words;
 use crate::graph::history::Sender;
 use crate::graph::{ById, Element};
-use crate::mission::event_log::Kind;
+use crate::mission::event_log::{Event, Kind};
 use crate::mission::rates::{Rates, mean, same};
 use crate::mission::{EventId, Mission};
 
@@ -40,7 +41,7 @@ pub(super) fn still(mut view: View, mission: &Mission) -> View {
                 rates.of_topics(&row.item.members, shown)
             }
         });
-        row.shown = Looks::of([shown.as_ref()]);
+        row.shown = ShownRuns::of([shown.as_ref()]);
     }
     let also = view.also.iter_mut();
     let also = also.flat_map(|also| also.items.iter().zip(&mut also.shown));
@@ -52,12 +53,12 @@ pub(super) fn still(mut view: View, mission: &Mission) -> View {
     {
         let shown = whole(looks, &lengths);
         let shown = shown.map(|shown| rates.of_topics(&item.members, shown));
-        *looks = Looks::of([shown.as_ref()]);
+        *looks = ShownRuns::of([shown.as_ref()]);
     }
     for (arrow, looks) in view.arrows.iter().zip(view.arrows_shown.iter_mut()) {
         let shown = whole(looks, &lengths);
         let shown = shown.map(|shown| rates.of_line(arrow, shown));
-        *looks = Looks::of([shown.as_ref()]);
+        *looks = ShownRuns::of([shown.as_ref()]);
     }
     let marks = marks(mission);
     let items = view.items.iter();
@@ -89,7 +90,7 @@ pub(super) fn still(mut view: View, mission: &Mission) -> View {
 pub(crate) fn union(view: &View) -> Option<SeenWindow> {
     view.frames.first()?;
     let lengths = Lengths::new(view.frames.iter().map(|f| f.span));
-    let all = |shown: &[Looks]| {
+    let all = |shown: &[ShownRuns]| {
         let whole = shown.iter().filter_map(|looks| whole(looks, &lengths));
         whole.collect()
     };
@@ -155,7 +156,7 @@ impl StillRates<'_> {
 }
 
 /// The look of one item or arrow in all windows together.
-fn whole(looks: &Looks, lengths: &Lengths) -> Option<Shown> {
+fn whole(looks: &ShownRuns, lengths: &Lengths) -> Option<Shown> {
     let mut slot = None;
     let (mut first, mut last) = (None, 0);
     for (from, to, _, shown) in looks.spans(lengths.windows()) {
@@ -234,19 +235,18 @@ type NodeMarks = BTreeMap<Element, Vec<(EventId, f64, Mark)>>;
 
 /// The starts, ends and restarts of each node in the log, in its order.
 fn marks(mission: &Mission) -> NodeMarks {
-    let mut marks = NodeMarks::new();
-    let events = mission.log.events.with_ids();
-    for (id, event) in events.filter(|(_, event)| event.is_headline() && event.what.is_node()) {
+    let mark = |(id, event): (EventId, &Event)| {
         let mark = match event.kind {
             Kind::Started => Mark::Added,
             Kind::Stopped => Mark::Removed,
             Kind::Restarted => Mark::Restarted,
-            _ => continue,
+            _ => return None,
         };
-        let own = marks.entry(event.what).or_default();
-        own.push((id, mission.span.part(event.time), mark));
-    }
-    marks
+        Some((event.what, (id, mission.span.part(event.time), mark)))
+    };
+    let events = mission.log.events.with_ids();
+    let events = events.filter(|(_, event)| event.is_headline() && event.what.is_node());
+    grouped(events.filter_map(mark))
 }
 
 /// The times of the nodes in a box; none for a box of topics.

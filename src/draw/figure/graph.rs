@@ -9,7 +9,7 @@ use crate::draw::timeline::drawer::{Density, Drawer};
 use crate::draw::timeline::notes::{flow, sentence};
 use crate::draw::timeline::phases;
 
-/// The space between the graph and the band in millimetres.
+/// The space between the graph and the band in millimetres, half a line of text.
 const BELOW: f64 = 1.2;
 
 /// The page of a picture of the mission in one window, which is as wide as the page.

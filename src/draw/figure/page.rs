@@ -18,7 +18,7 @@ use crate::draw::timeline::rows::{self, Row};
 use crate::draw::timeline::source::FigureSource;
 use crate::draw::timeline::{Timeline, legend};
 
-/// The shortest legible time axis, in millimetres.
+/// The shortest legible time axis, in millimetres: two of its labels side by side.
 const SHORTEST_AXIS: f64 = 15.0;
 
 /// The parts of a page.

@@ -9,7 +9,8 @@ use crate::draw::timeline::canvas::{HAIRLINE, PX_PER_MM, PaperCanvas, Type, ink}
 use crate::draw::timeline::notes::{Unbroken, flow, flow_at, sentence};
 use crate::mission::EventId;
 
-/// The space between two panels, inside their borders, and between the head of a panel and its graph, in millimetres.
+/// The space between two panels, inside their borders, and between the head of a panel and its graph, in millimetres: what
+/// belongs together is closer.
 const BETWEEN: f64 = 2.0;
 const INSIDE: f64 = 1.3;
 const HEAD: f64 = 0.6;

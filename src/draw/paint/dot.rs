@@ -15,7 +15,7 @@ use crate::evidence::Evidence;
 use crate::graph::{ById, Element, Elements, Id as _, State};
 use crate::layout::{self, Layout, Link, Orientation, Outline, Plan, Vertex};
 use crate::mission::Mission;
-use crate::view::{Arrow, ItemKind, Looks, Mark, Shown, View};
+use crate::view::{Arrow, ItemKind, Mark, Shown, ShownRuns, View};
 
 /// The font size of `qt_dotgraph`, in points; one point is one pixel of ours.
 const FONT: f64 = 11.0;
@@ -23,7 +23,7 @@ const FONT: f64 = 11.0;
 const SLACK: f64 = 1.15;
 /// The height of nodes and topics, Graphviz's half inch.
 const HEIGHT: f64 = 36.0;
-/// The height of a line of text.
+/// The height of a line of text of that font, in points.
 const LINE: f64 = 15.0;
 
 /// A view with the parts that all its DOT files share: unique ids and one layout.
@@ -125,7 +125,7 @@ fn plan(view: &View, fonts: &Fonts) -> Plan {
         }
     });
     let mut widest = ById::like(&view.arrows, None::<f64>);
-    for shown in view.arrows_shown.iter().flat_map(Looks::distinct) {
+    for shown in view.arrows_shown.iter().flat_map(ShownRuns::distinct) {
         let arrow = view.arrows.get(shown.arrow());
         let label = arrow.and_then(|arrow| label(arrow, shown));
         if let (Some(label), Some(most)) = (label, widest.get_mut(shown.arrow())) {

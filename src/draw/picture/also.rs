@@ -3,22 +3,21 @@
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
 
-use super::boxes::Boxes;
-use super::measured::{LINE, counting};
 use super::options;
-use super::texts;
+use super::page::GraphPen;
+use super::texts::{self, LINE, counting};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::base::words::rate_change;
-use crate::draw::scene::{Anchor, Group, Text};
+use crate::draw::scene::{Anchor, Font, Group, Text};
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::view::{AlsoHere, Item, Mark, Shown, View};
 
-/// The width at which the words are wrapped unless their namespace is wider, in text heights.
+/// The width at which the words are wrapped unless their namespace is wider, in text heights: two names of usual length.
 const WIDTH: f64 = 22.0;
-/// The space above the words, in text heights.
+/// The space above the words, in text heights: they must not look like names of the boxes above.
 const ABOVE: f64 = 0.4;
-/// The distance of the words from the frame of their namespace, in pixels.
+/// The distance of the words from the frame of their namespace, in pixels: that of its title.
 const INSET: f64 = 8.0;
 const FIRST: &str = "also here:";
 /// The most names that are listed: ten lines or so. The others are counted.
@@ -131,7 +130,7 @@ pub(crate) fn is_news(words: &Group) -> bool {
     words.data.iter().any(|(key, _)| *key == "entries")
 }
 
-impl Boxes<'_> {
+impl GraphPen<'_> {
     /// The introductory words and the names of a footer for drawings of all windows, each with its rectangle.
     pub(crate) fn footer_words(&self, footer: &Footer, place: Rect) -> Vec<(String, Rect)> {
         let size = self.style.edge.size;
@@ -144,10 +143,8 @@ impl Boxes<'_> {
         let rect = |(word, at): (String, Point)| {
             let width = self.fonts.width(&word, size, Weight::Regular);
             let top = bottom - size * LINE * (last - at.y + 1.0);
-            (
-                word,
-                Rect::new(place.x + inset + at.x, top, width, size * LINE),
-            )
+            let rect = Rect::new(place.x + inset + at.x, top, width, size * LINE);
+            (word, rect)
         };
         words.into_iter().zip(places).map(rect).collect()
     }
@@ -186,37 +183,20 @@ impl Boxes<'_> {
             let places: Vec<String> = events.iter().map(ToString::to_string).collect();
             data.push(("entries", places.join(" ")));
         }
-        let mut group = Group {
-            id: format!(
-                "also{}",
-                footer.cluster.map_or_else(String::new, |at| at.to_string())
-            ),
-            class: "also".to_owned(),
-            data,
-            title: names.join("\n"),
-            ..Group::default()
-        };
+        let number = footer.cluster.map_or_else(String::new, |at| at.to_string());
+        let mut group = Group::new(format!("also{number}"), "also")
+            .with(data)
+            .titled(names.join("\n"));
         let marks = listed.iter().map(|at| seen[*at].1.mark);
         let marks = std::iter::once(None).chain(marks).chain([None]);
         for ((word, at), mark) in words.into_iter().zip(places).zip(marks) {
-            group.text(Text {
-                at: Point::new(
-                    place.x + (inset + at.x) * scale,
-                    place.bottom() - inset * 0.8 * scale - step * (last - at.y + 0.15),
-                ),
-                anchor: Anchor::Start,
-                size,
-                weight: if mark.is_some() {
-                    Weight::SemiBold
-                } else {
-                    Weight::Regular
-                },
-                color: mark.map_or(self.style.page.quiet, |mark| {
-                    options::change(self.style, mark).color
-                }),
-                halo: None,
-                text: word,
-            });
+            let bottom = place.bottom() - inset * 0.8 * scale;
+            let x = place.x + (inset + at.x) * scale;
+            let at = Point::new(x, bottom - step * (last - at.y + 0.15));
+            let changed = mark.map(|mark| options::change(self.style, mark).color);
+            let color = changed.unwrap_or(self.style.page.quiet);
+            let font = Font::new(size, Weight::of(mark.is_some()), color);
+            group.text(Text::new(Anchor::Start, at, font, word));
         }
         (!names.is_empty()).then_some(group)
     }

@@ -1,30 +1,24 @@
 //! Publications and subscriptions: their routes, rates and signs of change.
 
-use super::boxes::{class, reported};
-use super::measured::{LINE, arrow_label};
+use super::ids::{class, reported};
 use super::options::{self, ArrowLook};
-use super::page::GraphFit;
+use super::page::{GraphFit, GraphPen};
+use super::texts::{LINE, arrow_label};
 use super::{badge, texts, topics};
 use crate::base::geometry::{Point, Rect, Size, after, on_cubic, polyline};
-use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, polygon};
-use crate::draw::style::{Color, Style};
-use crate::draw::text::{Fonts, Weight};
+use crate::draw::scene::{Anchor, Font, Form, Group, Shape, Step, Stroke, Text, polygon};
+use crate::draw::style::Color;
+use crate::draw::text::Weight;
 use crate::layout::Route;
 use crate::view::{Arrow, ArrowKind, Mark, Shown};
 
-/// The number of straight pieces in which a curve is measured, and of those in which its exit from a frame is
-/// searched.
+/// The number of straight pieces in which a curve is measured: with ten, its length is exact to a hundredth.
 const PIECES: u32 = 10;
+/// The number of those in which its exit from a frame is searched: fine enough
+/// for the head of an arrow to end on the frame.
 const EXIT: u32 = 64;
-/// The largest distance of a label from its line in pixels.
+/// The largest distance of a label from its line in pixels, a line of text: one further away needs a line to it.
 const NEAR: f64 = 12.0;
-
-/// The style, the fonts and the scale that arrows are drawn with.
-pub(crate) struct Arrows<'a> {
-    pub(crate) style: &'a Style,
-    pub(crate) fonts: &'a Fonts,
-    pub(crate) fit: GraphFit,
-}
 
 /// The positions of the parts of one arrow on the page, equal in every frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -107,6 +101,7 @@ impl ArrowPath {
             Rect::around(fit.point(label), room)
         });
         let label = area.map(|area| LabelPlace::new(area, &points));
+        // A badge without its halo, and parts of the line, its middle first; the ends are for heads.
         let badge = Size::new(12.0, 12.0);
         let covers = |p: &Point| area.is_some_and(|area| area.overlaps(&Rect::around(*p, badge)));
         let mut spots = [0.5, 0.4, 0.6, 0.3, 0.7, 0.22, 0.78]
@@ -206,7 +201,7 @@ impl ArrowPath {
     }
 }
 
-impl Arrows<'_> {
+impl GraphPen<'_> {
     /// One arrow in one window, with its ends in that window.
     pub(crate) fn arrow(
         &self,
@@ -215,13 +210,13 @@ impl Arrows<'_> {
         shown: &Shown,
         ends: [Option<&Shown>; 2],
     ) -> Group {
-        let (mut group, over) = self.parts(arrow, track, shown, ends);
+        let (mut group, over) = self.arrow_parts(arrow, track, shown, ends);
         group.pieces.extend(over.pieces);
         group
     }
 
     /// Its line, and its rate and badge, which lines must not cover.
-    pub(crate) fn parts(
+    pub(crate) fn arrow_parts(
         &self,
         arrow: &Arrow,
         track: &ArrowPath,
@@ -231,13 +226,11 @@ impl Arrows<'_> {
         let look = options::of_arrow(self.style, &arrow.kind, shown, shown.steady_hz);
         let [from, to] = &track.ends;
         let kind = arrow.kind.word();
-        let mut group = Group {
-            id: track.id.clone(),
-            class: class(&format!("edge {}", arrow.class()), shown),
-            data: reported(vec![("from", from.clone()), ("to", to.clone())], shown),
-            title: format!("{from} → {to}\n{kind}: {}", texts::facts(shown)),
-            ..Group::default()
-        };
+        let class = class(&format!("edge {}", arrow.class()), shown);
+        let data = vec![("from", from.clone()), ("to", to.clone())];
+        let mut group = Group::new(track.id.clone(), class)
+            .with(reported(data, shown))
+            .titled(format!("{from} → {to}\n{kind}: {}", texts::facts(shown)));
         if arrow.kind == ArrowKind::Bundle {
             group
                 .data
@@ -360,19 +353,10 @@ impl Arrows<'_> {
                 None if mark.is_some() => look.stroke.color,
                 None => look.text,
             };
-            group.text(Text {
-                at: Point::new(edge.x, y + size * (0.36 + LINE * (f64::from(at) - middle))),
-                anchor: place.side,
-                size,
-                weight: if mark.is_some() {
-                    Weight::SemiBold
-                } else {
-                    Weight::Regular
-                },
-                color,
-                halo: Some((style.halo, halo)),
-                text: row.words(is_upright, is_forward),
-            });
+            let at = Point::new(edge.x, y + size * (0.36 + LINE * (f64::from(at) - middle)));
+            let font = Font::new(size, Weight::of(mark.is_some()), color);
+            let text = Text::new(place.side, at, font, row.words(is_upright, is_forward));
+            group.text(text.with_halo(style.halo, halo));
         }
     }
 
@@ -401,10 +385,8 @@ impl Arrows<'_> {
             Some(_) => (Weight::SemiBold, look.stroke.color),
             None => (Weight::Regular, look.text),
         };
-        group.text(Text {
-            halo: Some((style.halo, style.halo_width * self.fit.scale)),
-            ..Text::centred(place.side, edge, (size, weight), color, text)
-        });
+        let text = Text::centred(place.side, edge, Font::new(size, weight, color), text);
+        group.text(text.with_halo(style.halo, style.halo_width * self.fit.scale));
     }
 }
 

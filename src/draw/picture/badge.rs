@@ -1,9 +1,9 @@
 //! The signs of change: a round badge at a corner, and a rate label.
 
-use super::measured::{BADGE_HEIGHT, BADGE_PAD};
 use super::options;
+use super::texts::{BADGE_HEIGHT, BADGE_PAD};
 use crate::base::geometry::{Point, Rect, Size};
-use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, polygon};
+use crate::draw::scene::{Anchor, Font, Form, Group, Shape, Step, Stroke, Text, polygon};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::view::Mark;
@@ -17,11 +17,8 @@ pub(crate) fn badge(group: &mut Group, style: &Style, mark: Mark, centre: Point,
     let radius = style.badge.radius * scale;
     let around = |r: f64| Form::Ellipse(Rect::around(centre, Size::new(2.0 * r, 2.0 * r)));
     let color = options::change(style, mark).color;
-    group.shape(Shape {
-        form: around(radius),
-        fill: color,
-        stroke: Stroke::solid(style.badge.halo, 1.2 * scale),
-    });
+    let halo = Stroke::solid(style.badge.halo, 1.2 * scale);
+    group.shape(Shape::new(around(radius), color, halo));
     sign(group, style.badge.sign, mark, centre, radius * 0.56);
 }
 
@@ -38,38 +35,24 @@ fn sign(group: &mut Group, color: Color, mark: Mark, centre: Point, r: f64) {
         });
         Form::Path(steps.collect())
     };
+    let filled = |points: &[Point]| Shape::filled(polygon(points), color);
     match mark {
-        Mark::Added => group.shape(stroke(lines(&[
-            (-1.0, 0.0),
-            (1.0, 0.0),
-            (0.0, -1.0),
-            (0.0, 1.0),
-        ]))),
+        Mark::Added => {
+            let cross = lines(&[(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)]);
+            group.shape(stroke(cross));
+        }
         Mark::Removed => group.shape(stroke(lines(&[(-1.0, 0.0), (1.0, 0.0)]))),
-        Mark::Faster => group.shape(Shape::filled(
-            polygon(&[at(-1.0, 0.7), at(0.0, -0.95), at(1.0, 0.7)]),
-            color,
-        )),
-        Mark::Slower => group.shape(Shape::filled(
-            polygon(&[at(-1.0, -0.7), at(0.0, 0.95), at(1.0, -0.7)]),
-            color,
-        )),
+        Mark::Faster => group.shape(filled(&[at(-1.0, 0.7), at(0.0, -0.95), at(1.0, 0.7)])),
+        Mark::Slower => group.shape(filled(&[at(-1.0, -0.7), at(0.0, 0.95), at(1.0, -0.7)])),
         Mark::HandedOver => {
-            group.shape(stroke(lines(&[
-                (-1.1, -0.45),
-                (0.6, -0.45),
-                (1.1, 0.5),
-                (-0.6, 0.5),
-            ])));
-            let head = |tip: Point, back: f64| {
-                polygon(&[
-                    tip,
-                    Point::new(tip.x + back, tip.y - 0.6 * r),
-                    Point::new(tip.x + back, tip.y + 0.6 * r),
-                ])
+            let both = lines(&[(-1.1, -0.45), (0.6, -0.45), (1.1, 0.5), (-0.6, 0.5)]);
+            group.shape(stroke(both));
+            let mut head = |tip: Point, back: f64| {
+                let foot = |aside: f64| Point::new(tip.x + back, tip.y + aside * r);
+                group.shape(filled(&[tip, foot(-0.6), foot(0.6)]));
             };
-            group.shape(Shape::filled(head(at(1.3, -0.45), -0.8 * r), color));
-            group.shape(Shape::filled(head(at(-1.3, 0.5), 0.8 * r), color));
+            head(at(1.3, -0.45), -0.8 * r);
+            head(at(-1.3, 0.5), 0.8 * r);
         }
         Mark::Restarted => {
             // Three quarters of a circle, open at the top right, where its arrow points.
@@ -80,30 +63,19 @@ fn sign(group: &mut Group, color: Color, mark: Mark, centre: Point, r: f64) {
                 Step::Curve([at(-0.9, 0.9 * K), at(-0.9 * K, 0.9), at(0.0, 0.9)]),
                 Step::Curve([at(0.9 * K, 0.9), at(0.9, 0.9 * K), at(0.9, 0.0)]),
             ])));
-            group.shape(Shape::filled(
-                polygon(&[at(0.0, -1.6), at(0.95, -0.9), at(0.0, -0.2)]),
-                color,
-            ));
+            group.shape(filled(&[at(0.0, -1.6), at(0.95, -0.9), at(0.0, -0.2)]));
         }
         Mark::Paused => {
-            group.shape(stroke(lines(&[
-                (-0.45, -0.9),
-                (-0.45, 0.9),
-                (0.45, -0.9),
-                (0.45, 0.9),
-            ])));
+            let bars = lines(&[(-0.45, -0.9), (-0.45, 0.9), (0.45, -0.9), (0.45, 0.9)]);
+            group.shape(stroke(bars));
         }
         Mark::Changed => {
-            group.shape(Shape::filled(
-                polygon(&[at(0.0, -1.1), at(1.1, 0.0), at(0.0, 1.1), at(-1.1, 0.0)]),
-                color,
-            ));
+            let corners = [at(0.0, -1.1), at(1.1, 0.0), at(0.0, 1.1), at(-1.1, 0.0)];
+            group.shape(filled(&corners));
         }
         Mark::Away | Mark::Inside => {
-            group.shape(Shape::filled(
-                Form::Ellipse(Rect::around(centre, Size::new(1.1 * r, 1.1 * r))),
-                color,
-            ));
+            let dot = Rect::around(centre, Size::new(1.1 * r, 1.1 * r));
+            group.shape(Shape::filled(Form::Ellipse(dot), color));
         }
     }
 }
@@ -126,6 +98,6 @@ pub(crate) fn label(
     let area = Rect::around(centre, Size::new(label_width(fonts, text, size), height));
     let form = Form::Rect(area, height / 2.0);
     group.shape(Shape::filled(form, paint.0));
-    let font = (size, Weight::SemiBold);
-    group.text(Text::centred(Anchor::Middle, centre, font, paint.1, text));
+    let font = Font::new(size, Weight::SemiBold, paint.1);
+    group.text(Text::centred(Anchor::Middle, centre, font, text));
 }

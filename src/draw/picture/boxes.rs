@@ -1,27 +1,21 @@
 //! Nodes, topics, groups and collapsed namespaces, and the boxes around namespaces.
 
+use super::badge;
 use super::card::Card;
-use super::measured::{LINE, Label, ShownRates, rate_label, second_line};
+use super::ids::{class, data, title};
 use super::options::{self, BoxLook};
-use super::page::GraphFit;
+use super::page::GraphPen;
 use super::spaces::Space;
-use super::{badge, texts};
+use super::texts::{LINE, Label, ShownRates, rate_label, second_line};
 use crate::base::geometry::{Point, Rect};
-use crate::draw::scene::{Anchor, Form, Group, Piece, Shape, Stroke, Text, polygon};
-use crate::draw::style::{Body, Color, Style};
-use crate::draw::text::{Fonts, Weight};
+use crate::draw::scene::{Anchor, Font, Form, Group, Piece, Shape, Stroke, Text, polygon};
+use crate::draw::style::{Body, Color};
+use crate::draw::text::Weight;
 use crate::graph::State;
-use crate::view::{Item, ItemKind, Mark, Shown};
+use crate::view::{Item, ItemKind, Shown};
 
-/// The dashes of an empty namespace.
+/// The dashes of an empty namespace: dots, as dashes stand for what is inferred.
 const EMPTY: [f64; 2] = [1.0, 4.0];
-
-/// The style, the fonts and the scale that boxes are drawn with.
-pub(crate) struct Boxes<'a> {
-    pub(crate) style: &'a Style,
-    pub(crate) fonts: &'a Fonts,
-    pub(crate) fit: GraphFit,
-}
 
 /// The parts of an item that are equal in every window.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,80 +31,43 @@ pub(crate) struct ItemBox {
     pub(crate) badge: Point,
 }
 
-impl Boxes<'_> {
+impl GraphPen<'_> {
     /// The box around a namespace; faint and dotted, with these words, while it has no content.
     pub(crate) fn space(&self, space: &Space, place: Rect, id: &str, empty: Option<&str>) -> Group {
         let style = &self.style.cluster;
         let scale = self.fit.scale;
         let place = self.fit.rect(place);
-        let mut group = Group {
-            id: format!("s{id}"),
-            class: "namespace".to_owned(),
-            data: vec![("name", space.name.clone())],
-            title: space.name.clone(),
-            ..Group::default()
+        let group = Group::new(format!("s{id}"), "namespace");
+        let mut group = group.with(vec![("name", space.name.clone())]);
+        group.title.clone_from(&space.name);
+        let (dash, fill, text) = match empty {
+            Some(words) => (&EMPTY[..], Color::NONE, format!("{} {words}", space.title)),
+            None => (&style.dash[..], style.fill, space.title.clone()),
         };
-        let stroke = Stroke {
-            color: style.stroke,
-            width: style.width,
-            dash: if empty.is_some() {
-                EMPTY.to_vec()
-            } else {
-                style.dash.clone()
-            },
-        };
-        group.shape(Shape {
-            form: Form::Rect(place, style.radius * scale),
-            fill: if empty.is_some() {
-                Color::NONE
-            } else {
-                style.fill
-            },
-            stroke: stroke.scaled(self.fit.pen),
-        });
-        group.text(Text {
-            at: Point::new(
-                place.x + 8.0 * scale,
-                place.y + (4.0 + style.size * 0.9) * scale,
-            ),
-            anchor: Anchor::Start,
-            size: style.size * scale,
-            weight: if empty.is_some() {
-                Weight::Regular
-            } else {
-                Weight::SemiBold
-            },
-            color: style.text,
-            halo: None,
-            text: empty.map_or_else(
-                || space.title.clone(),
-                |words| format!("{} {words}", space.title),
-            ),
-        });
+        let stroke = Stroke::dashed(style.stroke, style.width, dash).scaled(self.fit.pen);
+        let form = Form::Rect(place, style.radius * scale);
+        group.shape(Shape::new(form, fill, stroke));
+        // Beside the corner, and below it as far as a capital is high.
+        let (x, y) = (place.x + 8.0 * scale, 4.0 + style.size * 0.9);
+        let at = Point::new(x, place.y + y * scale);
+        let weight = Weight::of(empty.is_none());
+        let font = Font::new(style.size * scale, weight, style.text);
+        group.text(Text::new(Anchor::Start, at, font, text));
         group
     }
 
     /// Takes the title out of a namespace's box, to be painted over the lines that cross it, and moves it.
     pub(crate) fn title_of(&self, space: &mut Group, by: Point) -> Group {
-        let mut title = Group {
-            id: format!("{}..title", space.id),
-            class: "namespace-title".to_owned(),
-            data: space.data.clone(),
-            ..Group::default()
-        };
+        let title = Group::new(format!("{}..title", space.id), "namespace-title");
+        let mut title = title.with(space.data.clone());
         if let Some(Piece::Text(text)) = space.pieces.pop() {
-            let fill = &self.style.cluster.fill;
-            let plate = if *fill == Color::NONE {
-                self.style.page.background
-            } else {
-                *fill
+            let plate = match self.style.cluster.fill {
+                Color::NONE => self.style.page.background,
+                fill => fill,
             };
+            let at = Point::new(text.at.x + by.x, text.at.y + by.y);
             let halo = self.style.edge.halo_width * self.fit.scale * 1.5;
-            title.text(Text {
-                halo: Some((plate, halo)),
-                at: Point::new(text.at.x + by.x, text.at.y + by.y),
-                ..text
-            });
+            title.text(Text { at, ..text }.with_halo(plate, halo));
         }
         title
     }
@@ -121,13 +78,9 @@ impl Boxes<'_> {
         let body = options::body(self.style, item.kind);
         let look = options::of_box(style, body, shown);
         let place = card.place;
-        let mut group = Group {
-            id: card.id.clone(),
-            class: class(item.class(), shown),
-            data: self::data(item, shown),
-            title: title(item, shown),
-            ..Group::default()
-        };
+        let mut group = Group::new(card.id.clone(), class(item.class(), shown))
+            .with(data(item, shown))
+            .titled(title(item, shown));
         let inner = match &card.card {
             Some(rows) => self.card(&mut group, rows, place, &look),
             None => self.outline(&mut group, item, body, place, &look),
@@ -163,11 +116,9 @@ impl Boxes<'_> {
     /// The text of the rate label of a box, without its outline.
     pub(crate) fn rate_label_text(&self, place: Rect, text: &str) -> Text {
         let (below, size) = self.below(place);
-        let (font, color) = ((size, Weight::SemiBold), self.style.changed.color);
-        Text {
-            halo: Some((self.style.edge.halo, self.style.edge.halo_width)),
-            ..Text::centred(Anchor::Middle, below, font, color, text)
-        }
+        let font = Font::new(size, Weight::SemiBold, self.style.changed.color);
+        let (halo, width) = (self.style.edge.halo, self.style.edge.halo_width);
+        Text::centred(Anchor::Middle, below, font, text).with_halo(halo, width)
     }
 
     /// The outline, and the part inside it for the label.
@@ -180,21 +131,15 @@ impl Boxes<'_> {
         look: &BoxLook,
     ) -> Rect {
         let stroke = look.stroke.scaled(self.fit.pen);
-        group.shape(Shape {
-            form: self.form(item, body, place),
-            fill: look.fill,
-            stroke: stroke.clone(),
-        });
+        let form = self.form(item, body, place);
+        group.shape(Shape::new(form, look.fill, stroke.clone()));
         if matches!(item.kind, ItemKind::Node | ItemKind::Topic) {
             return place;
         }
         // Several in one: a second card behind the first.
         let front = self.front(place);
-        group.shape(Shape {
-            form: Form::Rect(front, body.radius * self.fit.scale),
-            fill: look.fill,
-            stroke,
-        });
+        let form = Form::Rect(front, body.radius * self.fit.scale);
+        group.shape(Shape::new(form, look.fill, stroke));
         front
     }
 
@@ -219,20 +164,13 @@ impl Boxes<'_> {
         }
         let stroke = look.stroke.scaled(self.fit.pen);
         let width = stroke.width + 2.0 * self.style.badge.glow * self.fit.pen;
-        let mut group = Group {
-            id: format!("{}..glow", card.id),
-            class: "glow".to_owned(),
-            data: vec![("of", card.id.clone())],
-            ..Group::default()
+        let group = Group::new(format!("{}..glow", card.id), "glow");
+        let mut group = group.with(vec![("of", card.id.clone())]);
+        let form = match card.card {
+            Some(_) => Form::Rect(card.place, self.card_radius()),
+            None => self.form(item, body, card.place),
         };
-        group.shape(Shape {
-            form: match card.card {
-                Some(_) => Form::Rect(card.place, self.card_radius()),
-                None => self.form(item, body, card.place),
-            },
-            fill: look.glow,
-            stroke: Stroke::solid(look.glow, width),
-        });
+        group.shape(Shape::new(form, look.glow, Stroke::solid(look.glow, width)));
         Some(group)
     }
 
@@ -284,14 +222,9 @@ impl Boxes<'_> {
         let middle = place.centre();
         // A line that is missing in this window keeps its space, so that the name does not move.
         let mut top = middle.y - label.height(body) * scale / 2.0;
-        let line = |y: f64, size: f64, weight, color, text: &str| Text {
-            at: Point::new(middle.x, y),
-            anchor: Anchor::Middle,
-            size: size * scale,
-            weight,
-            color,
-            halo: None,
-            text: text.to_owned(),
+        let line = |y: f64, size: f64, weight, color, text: &str| {
+            let font = Font::new(size * scale, weight, color);
+            Text::new(Anchor::Middle, Point::new(middle.x, y), font, text)
         };
         let y = top + body.size * (LINE / 2.0 + 0.35) * scale;
         group.text(line(y, body.size, body.weight(), look.text, &label.name));
@@ -326,60 +259,4 @@ pub(super) fn corners(place: Rect, scale: f64) -> [Point; 4] {
     let middle = place.centre();
     let (x, y) = (place.w / 2.0 - 4.0 * scale, place.h / 2.0 - scale);
     [(x, -y), (-x, -y), (x, y), (-x, y)].map(|(x, y)| Point::new(middle.x + x, middle.y + y))
-}
-
-/// The attributes of a box.
-pub(crate) fn data(item: &Item, shown: &Shown) -> Vec<(&'static str, String)> {
-    let mut data = vec![
-        ("name", item.name.to_string()),
-        ("state", shown.state.word().to_owned()),
-    ];
-    data.extend(shown.mark.map(|mark| ("mark", mark.word().to_owned())));
-    if !item.counted.is_empty() {
-        data.push(("topics", item.counted.join(" ")));
-    }
-    let members = shown.members.number();
-    data.extend(members.map(|(number, _)| ("members", number.to_string())));
-    reported(data, shown)
-}
-
-/// The attributes of an element, with the log indices of its headlines in this window.
-pub(crate) fn reported(
-    mut data: Vec<(&'static str, String)>,
-    shown: &Shown,
-) -> Vec<(&'static str, String)> {
-    if !shown.events.is_empty() {
-        let places: Vec<String> = shown.events.iter().map(ToString::to_string).collect();
-        data.push(("entries", places.join(" ")));
-    }
-    data
-}
-
-/// The class words of an element, `node added active measured`: its kind, its mark, its state, its confidence.
-pub(crate) fn class(what: &str, shown: &Shown) -> String {
-    let mut words = vec![what];
-    words.extend(shown.mark.map(Mark::class));
-    words.extend([shown.state.word(), shown.confidence.word()]);
-    if matches!(shown.mark, Some(Mark::HandedOver)) {
-        words.push("handed-over");
-    }
-    if matches!(shown.mark, Some(Mark::Restarted)) {
-        words.push("restarted");
-    }
-    if shown.is_starved {
-        words.push("starved");
-    }
-    words.dedup();
-    words.join(" ")
-}
-
-pub(crate) fn title(item: &Item, shown: &Shown) -> String {
-    let what = match item.kind {
-        ItemKind::Node => "node",
-        _ if item.is_service => "service",
-        ItemKind::Topic => "topic",
-        ItemKind::Group => "topics",
-        ItemKind::Namespace => "namespace",
-    };
-    format!("{}\n{what}: {}", item.name, texts::facts(shown))
 }

@@ -3,29 +3,31 @@
 use std::collections::BTreeSet;
 
 use super::badge;
-use super::boxes::{Boxes, ItemBox, class, data, title};
-use super::item_id;
-use super::measured::{ShownRates, second_line, short_name};
+use super::ids::{class, data, item_id, title};
 use super::options::{self, BoxLook};
+use super::page::GraphPen;
+use super::texts::{ShownRates, second_line, short_name};
 use super::topics::{called, fitted};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::base::name::namespace;
-use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Text};
+use crate::draw::scene::{Anchor, Font, Form, Group, Shape, Step, Text};
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::graph::{Id as _, State};
-use crate::view::{CardRow, Mark, Shown, View};
+use crate::view::{BoxRow, Mark, Shown, View};
 
-/// The height of a row, relative to the size of its text.
+/// The height of a row, relative to the size of its text: a badge and the frame of a change
+/// fit into it.
 const STEP: f64 = 1.5;
 /// The space before and after the words of a row, and between a name and its rate, relative to the size of
-/// the text.
+/// the text: a letter's width is half a height, and the gap must be more than one between words.
 const PAD: f64 = 1.1;
-/// The most names in a row of topics without messages.
+/// The most names in a row of topics without messages: a row of more would be the widest of its box.
 const MOST_SILENT: usize = 3;
-/// The most rows of a box of which few are listed; of more, the last counts those that are not.
+/// The most rows of a box of which few are listed, as many as a line between boxes has; of more, the last counts those that
+/// are not.
 const MOST_ROWS: usize = 3;
-/// The size of a badge in a row, relative to that on a box.
+/// The size of a badge in a row, relative to that on a box: it fits into the height of the row.
 const BADGE: f64 = 0.7;
 
 /// The rows of a box.
@@ -120,19 +122,19 @@ impl Card {
 }
 
 /// Whether there is an event about a topic or its connection.
-fn is_changing(row: &CardRow) -> bool {
+fn is_changing(row: &BoxRow) -> bool {
     row.shown.distinct().iter().any(|look| look.mark.is_some())
 }
 
 /// Whether a topic has no events and either never carries a message or is a hub.
-fn is_quiet(row: &CardRow) -> bool {
+fn is_quiet(row: &BoxRow) -> bool {
     let is_silent = |look: &Shown| look.state != State::Latched && look.hz.unwrap_or(0.0) <= 0.0;
     let mut looks = row.shown.distinct().iter();
     !is_changing(row) && looks.all(|look| is_silent(look) || row.is_infrastructure)
 }
 
 /// The name of a topic as drawn: relative to the namespace of the node.
-fn name(view: &View, row: &CardRow, fonts: &Fonts, size: f64) -> String {
+fn name(view: &View, row: &BoxRow, fonts: &Fonts, size: f64) -> String {
     let inside = namespace(&view.items[row.owner].name).trim_end_matches('/');
     let name = fitted(short_name(&row.item.label, inside), fonts, size);
     if row.item.is_service {
@@ -178,22 +180,15 @@ fn rate(shown: &Shown) -> Option<String> {
     second_line(shown, ShownRates::Rates).or_else(latched)
 }
 
-impl Boxes<'_> {
+impl GraphPen<'_> {
     /// The outline of a card, and its head, which is returned.
     pub(crate) fn card(&self, group: &mut Group, card: &Card, place: Rect, look: &BoxLook) -> Rect {
         let (scale, stroke) = (self.fit.scale, look.stroke.scaled(self.fit.pen));
         let radius = self.card_radius();
-        group.shape(Shape {
-            form: Form::Rect(place, radius),
-            fill: self.style.page.background,
-            stroke: stroke.clone(),
-        });
+        let (form, fill) = (Form::Rect(place, radius), self.style.page.background);
+        group.shape(Shape::new(form, fill, stroke.clone()));
         let head = Rect::new(place.x, place.y, place.w, card.head * scale);
-        group.shape(Shape {
-            form: round_top(head, radius),
-            fill: look.fill,
-            stroke,
-        });
+        group.shape(Shape::new(round_top(head, radius), look.fill, stroke));
         head
     }
 
@@ -202,18 +197,20 @@ impl Boxes<'_> {
         self.style.node.radius.max(self.style.topic.radius) * self.fit.scale * 0.7
     }
 
-    /// The rows of a card that exist in window `k`.
-    pub(crate) fn card_rows(&self, card: &ItemBox, view: &View, k: usize) -> Vec<Group> {
-        let (size, place) = (self.style.topic.size * self.fit.scale, card.place);
-        let Some(rows) = &card.card else {
-            return Vec::new();
-        };
-        let top = place.y + rows.head * self.fit.scale + size * 0.2;
-        let lines = rows.lines.iter().zip(0_u32..);
+    /// The rows of a card with its outline at `place` that exist in window `k`; `owner` is the id of its group.
+    pub(crate) fn card_rows(
+        &self,
+        (card, owner): (&Card, &str),
+        place: Rect,
+        (view, k): (&View, usize),
+    ) -> Vec<Group> {
+        let size = self.style.topic.size * self.fit.scale;
+        let top = place.y + card.head * self.fit.scale + size * 0.2;
+        let lines = card.lines.iter().zip(0_u32..);
         let row = |(line, at): (&Line, u32)| {
             let y = top + size * STEP * f64::from(at);
             let place = Rect::new(place.x, y, place.w, size * STEP);
-            self.row(line, &card.id, (place, view, k))
+            self.row(line, owner, (place, view, k))
         };
         lines.filter_map(row).collect()
     }
@@ -228,15 +225,12 @@ impl Boxes<'_> {
             let row = &view.rows[*at];
             Some((row, view.seen_at(&row.shown, k)?))
         });
-        let seen: Vec<(&CardRow, Shown)> = seen.collect();
+        let seen: Vec<(&BoxRow, Shown)> = seen.collect();
         let (row, shown) = seen.first()?;
-        let mut group = Group {
-            id: format!("{owner}..{}", item_id(&row.item)),
-            class: class(row.item.class(), shown),
-            data: data(&row.item, shown),
-            title: title(&row.item, shown),
-            ..Group::default()
-        };
+        let id = format!("{owner}..{}", item_id(&row.item));
+        let mut group = Group::new(id, class(row.item.class(), shown))
+            .with(data(&row.item, shown))
+            .titled(title(&row.item, shown));
         if seen.len() > 1 {
             let names: Vec<&str> = seen.iter().map(|(row, _)| &*row.item.name).collect();
             group.data = vec![("names", names.join(" "))];
@@ -252,10 +246,8 @@ impl Boxes<'_> {
         if let Some(mark) = shown.mark.filter(is_new) {
             let inset = style.added.width / 2.0 * self.fit.pen;
             let inside = Rect::new(place.x + inset, place.y, place.w - 2.0 * inset, place.h);
-            group.shape(Shape::filled(
-                Form::Rect(inside, 0.0),
-                options::change(style, mark).fill,
-            ));
+            let fill = options::change(style, mark).fill;
+            group.shape(Shape::filled(Form::Rect(inside, 0.0), fill));
             if let Some(mark) = shown.badge() {
                 let at = Point::new(place.x, middle);
                 badge::badge(&mut group, style, mark, at, self.fit.pen * BADGE);
@@ -264,13 +256,13 @@ impl Boxes<'_> {
         let (weight, quiet) = look.small;
         let is_there = |at: usize| view.rows[at].shown.at(k).is_some();
         let left = Point::new(place.x + PAD * size, middle);
-        let (font, words) = ((size, weight), line.words(is_there));
-        group.text(Text::centred(Anchor::Start, left, font, look.text, words));
+        let (font, words) = (Font::new(size, weight, look.text), line.words(is_there));
+        group.text(Text::centred(Anchor::Start, left, font, words));
         let rate = rate(shown).filter(|_| seen.len() == 1 && !shown.is_ghost());
         let small = style.topic.small * self.fit.scale;
         let right = Point::new(place.right() - PAD * size, middle);
-        let (font, rate) = ((small, weight), rate.unwrap_or_default());
-        group.text(Text::centred(Anchor::End, right, font, quiet, rate));
+        let (font, rate) = (Font::new(small, weight, quiet), rate.unwrap_or_default());
+        group.text(Text::centred(Anchor::End, right, font, rate));
         Some(group)
     }
 }

@@ -8,11 +8,12 @@ use super::arrows::ArrowPath;
 use super::page::GraphFit;
 use super::topics;
 use crate::base::geometry::Size;
+use crate::base::ids::grouped;
 use crate::draw::style::Edge;
 use crate::draw::text::Fonts;
 use crate::graph::{ById, Id as _};
 use crate::layout::Layout;
-use crate::view::{Arrow, ArrowId, ArrowKind, ItemId, Looks, Shown, TopicRow, View};
+use crate::view::{Arrow, ArrowId, ArrowKind, ItemId, Shown, ShownRuns, TopicRow, View};
 
 /// The lines between the boxes of a namespace and one box outside of it, drawn as one while they are
 /// unchanged.
@@ -30,16 +31,12 @@ pub(crate) struct Gate {
 
 /// The gates of a view. Lines to topics, which are drawn as boxes, have none.
 pub(crate) fn gates(view: &View) -> Vec<Gate> {
-    let mut found: BTreeMap<(usize, ItemId), Vec<(ArrowId, bool)>> = BTreeMap::new();
-    for (at, arrow) in view.arrows.with_ids() {
-        if let Some((space, is_outward)) =
-            crossed(view, arrow).filter(|_| is_between_nodes(view, arrow))
-        {
-            let outside = if is_outward { arrow.to } else { arrow.from };
-            let members = found.entry((space, outside)).or_default();
-            members.push((at, is_outward));
-        }
-    }
+    let crossing = |(at, arrow): (ArrowId, &Arrow)| {
+        let (space, is_outward) = crossed(view, arrow)?;
+        let outside = if is_outward { arrow.to } else { arrow.from };
+        is_between_nodes(view, arrow).then_some(((space, outside), (at, is_outward)))
+    };
+    let found = grouped(view.arrows.with_ids().filter_map(crossing));
     let found = found.into_iter().filter(|(_, members)| members.len() > 1);
     let gate = |((space, _), members): (_, Vec<(ArrowId, bool)>)| {
         let quiet = |at: ArrowId| {
@@ -66,7 +63,7 @@ pub(crate) fn gates(view: &View) -> Vec<Gate> {
 }
 
 /// The number of windows in which an element exists without a mark.
-fn quiet_windows(shown: &Looks, windows: usize) -> usize {
+fn quiet_windows(shown: &ShownRuns, windows: usize) -> usize {
     let mut runs: Vec<(usize, bool)> = shown
         .runs()
         .map(|(window, look)| (window as usize, look.is_some_and(is_quiet)))
@@ -111,7 +108,7 @@ impl Gate {
     pub(crate) fn turns(&self, view: &View) -> BTreeSet<u32> {
         let shown = self.members.iter();
         let shown = shown.filter_map(|(at, _)| view.arrows_shown.get(*at));
-        shown.flat_map(Looks::runs).map(|run| run.0).collect()
+        shown.flat_map(ShownRuns::runs).map(|run| run.0).collect()
     }
 
     /// Whether each line is drawn separately in some window.

@@ -1,12 +1,13 @@
-//! The ids of groups in SVG, and the names that the font cannot show.
+//! The ids, classes and attributes of groups in SVG, and the names that the font cannot show.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use super::texts;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words;
 use crate::draw::text::Fonts;
-use crate::view::{Arrow, ArrowKind, Item, View};
+use crate::view::{Arrow, ArrowKind, Item, ItemKind, Mark, Shown, View};
 
 /// The notice about names with characters that no font contains; `None` if there are none.
 pub fn unshown(view: &View, fonts: &Fonts) -> Option<Notice> {
@@ -53,4 +54,60 @@ pub(super) fn encoded(name: &str) -> String {
         }
     }
     out
+}
+
+/// The attributes of a box.
+pub(crate) fn data(item: &Item, shown: &Shown) -> Vec<(&'static str, String)> {
+    let mut data = vec![
+        ("name", item.name.to_string()),
+        ("state", shown.state.word().to_owned()),
+    ];
+    data.extend(shown.mark.map(|mark| ("mark", mark.word().to_owned())));
+    if !item.counted.is_empty() {
+        data.push(("topics", item.counted.join(" ")));
+    }
+    let members = shown.members.number();
+    data.extend(members.map(|(number, _)| ("members", number.to_string())));
+    reported(data, shown)
+}
+
+/// The attributes of an element, with the log indices of its headlines in this window.
+pub(crate) fn reported(
+    mut data: Vec<(&'static str, String)>,
+    shown: &Shown,
+) -> Vec<(&'static str, String)> {
+    if !shown.events.is_empty() {
+        let places: Vec<String> = shown.events.iter().map(ToString::to_string).collect();
+        data.push(("entries", places.join(" ")));
+    }
+    data
+}
+
+/// The class words of an element, `node added active measured`: its kind, its mark, its state, its confidence.
+pub(crate) fn class(what: &str, shown: &Shown) -> String {
+    let mut words = vec![what];
+    words.extend(shown.mark.map(Mark::class));
+    words.extend([shown.state.word(), shown.confidence.word()]);
+    if matches!(shown.mark, Some(Mark::HandedOver)) {
+        words.push("handed-over");
+    }
+    if matches!(shown.mark, Some(Mark::Restarted)) {
+        words.push("restarted");
+    }
+    if shown.is_starved {
+        words.push("starved");
+    }
+    words.dedup();
+    words.join(" ")
+}
+
+pub(crate) fn title(item: &Item, shown: &Shown) -> String {
+    let what = match item.kind {
+        ItemKind::Node => "node",
+        _ if item.is_service => "service",
+        ItemKind::Topic => "topic",
+        ItemKind::Group => "topics",
+        ItemKind::Namespace => "namespace",
+    };
+    format!("{}\n{what}: {}", item.name, texts::facts(shown))
 }

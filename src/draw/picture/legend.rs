@@ -7,12 +7,12 @@ use super::options;
 use super::page::PageFrame;
 use crate::base::geometry::{Point, Rect};
 use crate::base::words;
-use crate::draw::scene::{Anchor, Form, Group, Shape, Stroke, Text, line};
+use crate::draw::scene::{Anchor, Font, Form, Group, Shape, Stroke, Text, line};
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::evidence::Confidence;
 use crate::graph::State;
-use crate::view::{ArrowKind, ItemKind, Looks, Mark, Shown, View};
+use crate::view::{ArrowKind, ItemKind, Mark, Shown, ShownRuns, View};
 
 /// A sign with its meaning.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,17 +33,17 @@ pub(crate) enum LegendSign {
 /// The signs that occur in the view, with their words.
 pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> {
     let kind = |kind| view.items.iter().any(|i| i.kind == kind);
-    let any = |is: &dyn Fn(&Shown) -> bool| view.looks().any(is);
+    let any = |is: &dyn Fn(&Shown) -> bool| view.all_shown().any(is);
     let mark = |marks: &[Mark]| any(&|s| s.mark.is_some_and(|m| marks.contains(&m)));
     let change = |own, words| (mark(&[own]), LegendSign::Change(own), words);
     let state = |state, words| {
         let boxes = view.items_shown.iter().chain(&view.arrows_shown);
-        let mut looks = boxes.flat_map(Looks::distinct);
+        let mut looks = boxes.flat_map(ShownRuns::distinct);
         let is_there = looks.any(|s| s.state == state && s.mark.is_none());
         (is_there, LegendSign::Box(state), words)
     };
     let confidence = |confidence, words| {
-        let mut looks = view.arrows_shown.iter().flat_map(Looks::distinct);
+        let mut looks = view.arrows_shown.iter().flat_map(ShownRuns::distinct);
         let is_there = looks.any(|s| s.confidence == confidence);
         (is_there, LegendSign::Line(confidence), words)
     };
@@ -52,39 +52,29 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
     } else {
         ("added", "removed")
     };
-    let percent = words::percent(rate_change);
+    let mut items = view.items.iter();
+    let is_topic = items.any(|i| i.kind == ItemKind::Topic && !i.is_service);
+    let is_service =
+        view.items.iter().any(|i| i.is_service) || view.arrows.iter().any(|a| a.is_service);
+    let (namespace, has_rows) = (kind(ItemKind::Namespace), !view.rows.is_empty());
+    let is_rate = mark(&[Mark::Faster, Mark::Slower]);
+    let rate = format!("rate ± {} %", words::percent(rate_change));
+    let is_starved = any(&|s| s.is_starved);
+    let is_rated = !view.arrows.is_empty() && any(&|s| s.hz.is_some());
     let all = [
         (kind(ItemKind::Node), LegendSign::Node, "node"),
-        (
-            view.items
-                .iter()
-                .any(|i| i.kind == ItemKind::Topic && !i.is_service),
-            LegendSign::Topic,
-            "topic",
-        ),
-        (
-            view.items.iter().any(|i| i.is_service) || view.arrows.iter().any(|a| a.is_service),
-            LegendSign::Service,
-            "service",
-        ),
+        (is_topic, LegendSign::Topic, "topic"),
+        (is_service, LegendSign::Service, "service"),
         (kind(ItemKind::Group), LegendSign::Group, "group"),
+        (namespace, LegendSign::Namespace, "namespace"),
         (
-            kind(ItemKind::Namespace),
-            LegendSign::Namespace,
-            "namespace",
-        ),
-        (
-            !view.rows.is_empty(),
+            has_rows,
             LegendSign::Row,
             "topic whose other end is unknown",
         ),
         change(Mark::Added, added),
         change(Mark::Removed, removed),
-        (
-            mark(&[Mark::Faster, Mark::Slower]),
-            LegendSign::Change(Mark::Slower),
-            &*format!("rate ± {percent} %"),
-        ),
+        (is_rate, LegendSign::Change(Mark::Slower), &*rate),
         change(Mark::HandedOver, "handed over"),
         change(Mark::Restarted, "back"),
         change(Mark::Paused, "fell silent"),
@@ -96,15 +86,11 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
         confidence(Confidence::Stated, "stated"),
         confidence(Confidence::Inferred, "inferred"),
         (
-            any(&|s| s.is_starved),
+            is_starved,
             LegendSign::Starved,
             "gets nothing (quality of service)",
         ),
-        (
-            !view.arrows.is_empty() && any(&|s| s.hz.is_some()),
-            LegendSign::Width,
-            "thicker = higher rate",
-        ),
+        (is_rated, LegendSign::Width, "thicker = higher rate"),
     ];
     let present = all.into_iter().filter(|(occurs, _, _)| *occurs);
     present
@@ -112,7 +98,8 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
         .collect()
 }
 
-/// The width of a sign, before its words.
+/// The widths of a sign (an arrow with its head, or a box that is not a square), of the space before its words, and of the
+/// space after them: twice that before, so that words belong to the sign on their left.
 const SIGN: f64 = 24.0;
 const GAP: f64 = 6.0;
 const AFTER: f64 = 14.0;
@@ -163,16 +150,11 @@ pub(crate) fn legend(
     for (at, row) in rows.iter().enumerate() {
         let y = place.y + 7.0 * unit + (at as f64 + 0.5) * height;
         for (sign, words, x) in row {
-            draw(
-                &mut group,
-                sign,
-                style,
-                Rect::new(*x, y - 6.0 * unit, SIGN * unit, 12.0 * unit),
-                unit,
-            );
+            let place = Rect::new(*x, y - 6.0 * unit, SIGN * unit, 12.0 * unit);
+            draw(&mut group, sign, style, place, unit);
             let at = Point::new(x + (SIGN + GAP) * unit, y);
-            let (font, color) = ((size, Weight::Regular), style.legend.text);
-            group.text(Text::centred(Anchor::Start, at, font, color, words));
+            let font = Font::new(size, Weight::Regular, style.legend.text);
+            group.text(Text::centred(Anchor::Start, at, font, words));
         }
     }
     group
@@ -188,36 +170,21 @@ fn draw(group: &mut Group, sign: &LegendSign, style: &Style, place: Rect, unit: 
         LegendSign::Node => card(group, style, place, true, State::Active, unit),
         LegendSign::Topic => card(group, style, place, false, State::Active, unit),
         LegendSign::Group => {
-            card(group, style, place, false, State::Active, unit);
-            card(
-                group,
-                style,
-                front(place, style, unit),
-                false,
-                State::Active,
-                unit,
-            );
+            for place in [place, front(place, style, unit)] {
+                card(group, style, place, false, State::Active, unit);
+            }
         }
         LegendSign::Namespace => {
             let stroke = Stroke::solid(style.node.stroke, style.node.width * unit);
             for place in [place, front(place, style, unit)] {
                 let form = Form::Rect(place, 4.0 * unit);
-                group.shape(Shape {
-                    form,
-                    fill: style.node.fill,
-                    stroke: stroke.clone(),
-                });
+                group.shape(Shape::new(form, style.node.fill, stroke.clone()));
             }
         }
         LegendSign::Row => {
-            let (at, font) = (place.centre(), (style.legend.size * unit, Weight::SemiBold));
-            group.text(Text::centred(
-                Anchor::Middle,
-                at,
-                font,
-                style.page.text,
-                "→",
-            ));
+            let size = style.legend.size * unit;
+            let font = Font::new(size, Weight::SemiBold, style.page.text);
+            group.text(Text::centred(Anchor::Middle, place.centre(), font, "→"));
         }
         LegendSign::Change(mark) => {
             let stroke = arrow_of(ArrowKind::Publish, Confidence::Measured, Some(*mark));
@@ -228,21 +195,16 @@ fn draw(group: &mut Group, sign: &LegendSign, style: &Style, place: Rect, unit: 
             card(group, style, place, false, *state, unit);
             if *state == State::Latched {
                 let inset = style.topic.width * unit / 2.0;
-                let width = style.latched.bar * unit;
-                let bar = Rect::new(
-                    place.x + inset,
-                    place.y + inset,
-                    width,
-                    place.h - 2.0 * inset,
-                );
+                let mut bar = place.grown(-inset);
+                bar.w = style.latched.bar * unit;
                 group.shape(Shape::filled(Form::Rect(bar, 0.0), style.latched.stroke));
             }
         }
-        LegendSign::Service => group.shape(Shape {
-            form: hexagon(place, style.topic.pad_x * unit * 0.7),
-            fill: style.topic.fill,
-            stroke: Stroke::solid(style.topic.stroke, style.topic.width * unit),
-        }),
+        LegendSign::Service => {
+            let form = hexagon(place, style.topic.pad_x * unit * 0.7);
+            let stroke = Stroke::solid(style.topic.stroke, style.topic.width * unit);
+            group.shape(Shape::new(form, style.topic.fill, stroke));
+        }
         LegendSign::Line(confidence) => {
             let stroke = arrow_of(ArrowKind::Subscribe, *confidence, None);
             arrow(group, place, stroke, (Tip::Arrow, style.edge.arrow * unit));
@@ -277,11 +239,7 @@ fn card(group: &mut Group, style: &Style, place: Rect, round: bool, state: State
     } else {
         Form::Rect(place, body.radius * unit)
     };
-    group.shape(Shape {
-        form,
-        fill: look.fill,
-        stroke: look.stroke.scaled(unit),
-    });
+    group.shape(Shape::new(form, look.fill, look.stroke.scaled(unit)));
 }
 
 /// The second card of a stack.
@@ -294,16 +252,12 @@ fn front(place: Rect, style: &Style, unit: f64) -> Rect {
 fn widths(group: &mut Group, style: &Style, place: Rect, unit: f64) {
     let edge = &style.edge;
     let y = place.centre().y;
-    for (part, width) in [
-        (0.0, edge.width),
-        (0.55, edge.width + 2.0 * edge.per_decade),
-    ] {
+    let wide = edge.width + 2.0 * edge.per_decade;
+    for (part, width) in [(0.0, edge.width), (0.55, wide)] {
         let from = Point::new(place.x + place.w * part, y);
         let to = Point::new(from.x + place.w * 0.45, y);
-        group.shape(Shape::line(
-            line(from, to),
-            Stroke::solid(edge.stroke, width * unit),
-        ));
+        let stroke = Stroke::solid(edge.stroke, width * unit);
+        group.shape(Shape::line(line(from, to), stroke));
     }
 }
 
@@ -317,8 +271,6 @@ fn arrow(group: &mut Group, place: Rect, stroke: Stroke, (kind, head): (Tip, f64
     let shorter = Rect::new(place.x, place.y, place.w - head * 0.7, place.h);
     group.shape(Shape::line(across(shorter), stroke));
     let tip = Point::new(place.right(), place.centre().y);
-    group.shape(Shape::filled(
-        kind.form(tip, Point::new(1.0, 0.0), head),
-        color,
-    ));
+    let form = kind.form(tip, Point::new(1.0, 0.0), head);
+    group.shape(Shape::filled(form, color));
 }

@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::arrows::Arrows;
 use super::spotlight::Spotlight;
 use super::{Picture, measured};
 use crate::draw::scene::{Group, Piece};
@@ -45,15 +44,11 @@ impl Picture<'_> {
         for (k, (.., fork)) in drawn.iter().enumerate() {
             last.extend(fork.map(|fork| (fork, k)));
         }
-        let arrows = Arrows {
-            style: measured.style,
-            fonts: measured.fonts,
-            fit: self.fit,
-        };
+        let pen = self.pen();
         let mut groups = [Vec::new(), Vec::new()];
         for (arrow, path, shown, fork) in &drawn {
             let ends = [arrow.from, arrow.to].map(|id| measured::find(&seen.items, id.at()));
-            let (mut line, mut label) = arrows.parts(arrow, path, shown, ends);
+            let (mut line, mut label) = pen.arrow_parts(arrow, path, shown, ends);
             if let Some(spot) = spotlight.filter(|spot| !spot.has_line(arrow, shown)) {
                 spot.pale(&mut line);
                 spot.pale(&mut label);

@@ -3,8 +3,12 @@
 use super::also::{self, Footer};
 use super::card::{self, Card};
 use super::gates::{self, Gate, larger};
-use super::spaces::{Space, first_seen, spaces};
-use super::{options, presence, replicas, texts, topics};
+use super::spaces::{self, Space, first_seen, spaces};
+use super::texts::{
+    BADGE_HEIGHT, BADGE_PAD, LINE, Label, NO_MESSAGE, ShownRates, arrow_label, counting,
+    second_line, short_name, shown_rates,
+};
+use super::{options, topics};
 use std::collections::BTreeSet;
 
 use crate::base::geometry::Size;
@@ -12,71 +16,20 @@ use crate::base::name::namespace;
 use crate::base::words;
 use crate::draw::style::{Body, Style};
 use crate::draw::text::{Fonts, Weight};
-use crate::graph::{ById, Id as _, State};
+use crate::graph::{ById, Id as _};
 use crate::layout::{self, Link, Outline, Plan, Vertex};
 use crate::view::both;
-use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Looks, Shown, View};
+use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Shown, ShownRuns, View};
 
 /// The largest width of a name in pixels, and in heights of its letters if these are large; longer ones are shortened in
-/// their middle.
+/// their middle. About 30 letters: of a wider box, a layer of the graph would be mostly space.
 const WIDEST: (f64, f64) = (230.0, 16.4);
-/// The most names below the first in a box; the others are counted.
+/// The most names below the first in a box; the others are counted. With six lines, a box
+/// is as high as three.
 const MOST_OTHERS: usize = 5;
-/// The height of a line of text, relative to its font size.
-pub(crate) const LINE: f64 = 1.22;
-/// The height of a rate label, and its width beyond its text, relative to the font size.
-pub(crate) const BADGE_HEIGHT: f64 = 1.5;
-pub(crate) const BADGE_PAD: f64 = 1.2;
-/// The least relative difference of a subscription's rate from its topic's for it to be written beside it.
-const OWN_RATE: f64 = 0.15;
-
-/// The space above and below the name in a rounded box, relative to that in an ellipse.
+/// The space above and below the name in a rounded box, relative to that in an ellipse, whose curve comes closer to the
+/// letters.
 const FLAT: f64 = 0.7;
-
-/// The label of a box.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Label {
-    /// The name as drawn.
-    pub(crate) name: String,
-    /// The names of other nodes in the box, below it.
-    pub(crate) others: Vec<String>,
-    /// Whether a smaller line is drawn below it in some window.
-    pub(crate) second: bool,
-    /// Whether a bar of the times at which it was there is drawn below it.
-    pub(crate) has_bar: bool,
-    /// The original name, if the font lacks some of its characters.
-    pub(crate) unshown: Option<String>,
-}
-
-impl Label {
-    /// The height of all its lines in pixels before scaling, with the bar below them.
-    pub(crate) fn height(&self, body: &Body) -> f64 {
-        let bar = if self.has_bar {
-            presence::room(body.size)
-        } else {
-            0.0
-        };
-        self.lines(body) + bar
-    }
-
-    /// The height of its lines without the bar.
-    pub(crate) fn lines(&self, body: &Body) -> f64 {
-        let small = if self.second { body.small * LINE } else { 0.0 };
-        body.size * LINE * (1 + self.others.len()) as f64 + small
-    }
-
-    /// The smaller line of a topic in a window without a message.
-    pub(crate) fn silence(&self, shown: &Shown, shown_rates: ShownRates) -> &'static str {
-        match shown.state {
-            _ if shown.is_ghost() || !self.second || shown_rates != ShownRates::Rates => "",
-            State::Latched => "latched",
-            _ => NO_MESSAGE,
-        }
-    }
-}
-
-/// The text instead of a rate if there was no message.
-const NO_MESSAGE: &str = "no msg";
 
 /// The labels of a view, and the plan that follows from them.
 #[derive(Clone, Debug, PartialEq)]
@@ -199,14 +152,6 @@ impl MeasuredGraph {
     }
 }
 
-/// A name with the number of topics that are only counted: `imu_driver +2`.
-pub(crate) fn counting(name: String, item: &Item) -> String {
-    match item.counted.len() {
-        0 => name,
-        more => format!("{name} +{more}"),
-    }
-}
-
 /// The outline of a box: rows need straight sides.
 fn outline(item: &Item, has_rows: bool, style: &Style) -> Outline {
     match item.kind {
@@ -227,8 +172,8 @@ impl Measurer<'_> {
     fn title(&self, space: &Space) -> Size {
         let size = self.style.cluster.size;
         let title = self.fonts.width(&space.title, size, Weight::SemiBold);
-        let badges = replicas::badges(space, self.fonts, size).pop();
-        let last = replicas::course(space, self.fonts, size).or(badges);
+        let badges = spaces::badges(space, self.fonts, size).pop();
+        let last = spaces::course(space, self.fonts, size).or(badges);
         let end = last.map_or(title, |(x, width)| x + width);
         Size::new(end, size * LINE)
     }
@@ -289,6 +234,7 @@ impl Measurer<'_> {
             ItemKind::Node if has_rows || !label.others.is_empty() => 0.0,
             ItemKind::Node if body.is_capsule() => {
                 let high = height + 2.0 * body.pad_y * FLAT;
+                // The round ends hold 0.3 of the space that straight ends need.
                 return Size::new((width + 1.7 * body.pad_x).max(high), high);
             }
             ItemKind::Node => return ellipse(width, height, body),
@@ -305,7 +251,7 @@ impl Measurer<'_> {
     fn second_lines(&self) -> Vec<Option<f64>> {
         let shown_rates = shown_rates(self.view);
         let mut widest = vec![None; self.view.items.len()];
-        for shown in self.view.items_shown.iter().flat_map(Looks::distinct) {
+        for shown in self.view.items_shown.iter().flat_map(ShownRuns::distinct) {
             let at = shown.id as usize;
             let Some(item) = self.view.items.get(shown.item()) else {
                 continue;
@@ -323,7 +269,7 @@ impl Measurer<'_> {
     fn rooms(&self, topics: &[Vec<String>]) -> ById<ArrowId, Option<Size>> {
         let style = &self.style.edge;
         let reported = shown_by_arrows(self.view);
-        let nothing = Looks::default();
+        let nothing = ShownRuns::default();
         let all = self
             .view
             .arrows
@@ -374,34 +320,6 @@ fn widen(most: &mut Option<f64>, width: f64) {
     *most = Some(most.map_or(width, |m: f64| m.max(width)));
 }
 
-/// The rates that a box shows because no arrow does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum ShownRates {
-    /// None: it is not a topic.
-    Nothing,
-    /// Changed rates of the whole topic: several nodes publish it, whose arrows show the other rates.
-    Changes,
-    /// All: at most one is ever known to publish it.
-    Rates,
-}
-
-/// The rates that each item shows: all those of a topic, unless several publishers share it; then only those that
-/// changed.
-pub(crate) fn shown_rates(view: &View) -> Vec<ShownRates> {
-    let mut senders = ById::like(&view.items, 0_usize);
-    for arrow in view.arrows.iter().filter(|a| a.kind == ArrowKind::Publish) {
-        if let Some(senders) = senders.get_mut(arrow.to) {
-            *senders += 1;
-        }
-    }
-    let shown_rates = |(item, senders): (&Item, usize)| match item.kind {
-        ItemKind::Node | ItemKind::Namespace => ShownRates::Nothing,
-        ItemKind::Topic | ItemKind::Group if senders > 1 => ShownRates::Changes,
-        ItemKind::Topic | ItemKind::Group => ShownRates::Rates,
-    };
-    view.items.iter().zip(senders).map(shown_rates).collect()
-}
-
 /// Whether each arrow shows its rate: a publication whose topic does not, a subscription with another rate.
 fn shown_by_arrows(view: &View) -> Vec<bool> {
     let shown_rates = shown_rates(view);
@@ -410,67 +328,6 @@ fn shown_by_arrows(view: &View) -> Vec<bool> {
             || shown_rates.get(arrow.to.at()) != Some(&ShownRates::Rates)
     };
     view.arrows.iter().map(reported).collect()
-}
-
-/// The text of an arrow in a window, and whether it is drawn as a rate label because it changed.
-pub(crate) fn arrow_label(
-    arrow: &Arrow,
-    shown: &Shown,
-    from: Option<&Shown>,
-) -> Option<(String, bool)> {
-    if shown.is_ghost() {
-        return None;
-    }
-    let called = if arrow.is_service { "() " } else { " " };
-    let topic = arrow
-        .carries(shown)
-        .map_or_else(String::new, |t| t + called);
-    if let Some((before, now)) = shown.rates.filter(|_| arrow.kind != ArrowKind::Bundle) {
-        return Some((topic + &words::rate_change(before, now), true));
-    }
-    let rate = texts::rate_in(shown);
-    match arrow.kind {
-        ArrowKind::Publish => rate.map(|rate| (rate, false)),
-        ArrowKind::Subscribe => {
-            let of_topic = from.and_then(|s| s.hz).unwrap_or(0.0);
-            let hz = shown.hz.unwrap_or(0.0);
-            let differs = (hz - of_topic).abs() > OWN_RATE * of_topic.max(hz);
-            rate.filter(|_| differs).map(|rate| (rate, false))
-        }
-        ArrowKind::Direct(_) => {
-            let rate = rate.unwrap_or_default();
-            Some(((topic + &rate).trim_end().to_owned(), false))
-        }
-        // Each of its topics has a row.
-        ArrowKind::Bundle => None,
-    }
-}
-
-/// The smaller line of a box in a window.
-pub(crate) fn second_line(shown: &Shown, shown_rates: ShownRates) -> Option<String> {
-    if let Some(inside) = &shown.inside {
-        return Some(texts::inside(inside));
-    }
-    if shown.is_ghost() {
-        return None;
-    }
-    if let Some((number, word)) = shown.members.number() {
-        return Some(words::count(number, word));
-    }
-    if let Some(state) = &shown.lifecycle {
-        return Some(state.to_string());
-    }
-    match (shown_rates, shown.rates) {
-        (ShownRates::Nothing | ShownRates::Changes, _) => None,
-        (ShownRates::Rates, Some((before, now))) => Some(words::rate_change(before, now)),
-        (ShownRates::Rates, None) => texts::rate_in(shown),
-    }
-}
-
-/// The rate label of a box in one window: the rate that changed, if neither an arrow nor its smaller line shows it.
-pub(crate) fn rate_label(shown: &Shown, shown_rates: ShownRates) -> Option<String> {
-    let (before, now) = shown.rates.filter(|_| shown_rates == ShownRates::Changes)?;
-    Some(words::rate_change(before, now))
 }
 
 /// The element with this id among those of a window, which are sorted.
@@ -486,17 +343,6 @@ fn ellipse(width: f64, height: f64, body: &Body) -> Size {
     let part = 0.75 * height / full;
     let stretch = 1.0 / libm::sqrt(1.0 - part * part);
     Size::new(width * stretch + 2.0 * body.pad_x, full)
-}
-
-/// The part of a name inside the namespace in whose box it is drawn.
-pub(crate) fn short_name<'a>(name: &'a str, inside: &str) -> &'a str {
-    let rest = name
-        .strip_prefix(inside)
-        .and_then(|rest| rest.strip_prefix('/'));
-    match rest {
-        Some(rest) if !inside.is_empty() && !rest.is_empty() => rest,
-        _ => name,
-    }
 }
 
 #[cfg(test)]

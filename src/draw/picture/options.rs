@@ -65,7 +65,7 @@ pub(crate) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
         let change = change(style, mark);
         return BoxLook {
             fill: change.fill,
-            stroke: line(change.color, change.width, &change.dash),
+            stroke: Stroke::dashed(change.color, change.width, &change.dash),
             text: change.text,
             small: (Weight::SemiBold, change.color),
             glow: glow(change, shown),
@@ -82,7 +82,7 @@ pub(crate) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
             };
             return BoxLook {
                 fill: body.fill,
-                stroke: line(body.stroke, body.width, dash),
+                stroke: Stroke::dashed(body.stroke, body.width, dash),
                 text: body.text,
                 small: (Weight::Regular, style.page.quiet),
                 glow: Color::NONE,
@@ -95,7 +95,7 @@ pub(crate) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
 fn quiet_box(quiet: &Quiet) -> BoxLook {
     BoxLook {
         fill: quiet.fill,
-        stroke: line(quiet.stroke, quiet.width, &quiet.dash),
+        stroke: Stroke::dashed(quiet.stroke, quiet.width, &quiet.dash),
         text: quiet.text,
         small: (Weight::Regular, quiet.text),
         glow: Color::NONE,
@@ -116,13 +116,15 @@ pub(crate) fn of_arrow(
     }
     if let Some(mark) = shown.mark {
         let change = change(style, mark);
+        // The style's width is that of a box; a line between boxes is noticed with two thirds of it.
         let width = match mark {
+            // A full line in this color would stand out more than one that is there.
             Mark::Removed => change.width * 0.8,
             // As wide as its rate requires, but never narrower than a visible change.
             _ => (change.width * 0.65).max(width_of(style, flow)),
         };
         return ArrowLook {
-            stroke: line(change.color, width, &change.dash),
+            stroke: Stroke::dashed(change.color, width, &change.dash),
             text: change.text,
             dot: latched,
             glow: glow(change, shown),
@@ -147,7 +149,7 @@ pub(crate) fn of_arrow(
         &[]
     };
     ArrowLook {
-        stroke: line(edge.stroke, width, dash),
+        stroke: Stroke::dashed(edge.stroke, width, dash),
         text: edge.text,
         dot: latched,
         glow: Color::NONE,
@@ -156,7 +158,7 @@ pub(crate) fn of_arrow(
 
 fn quiet_arrow(quiet: &Quiet) -> ArrowLook {
     ArrowLook {
-        stroke: line(quiet.stroke, quiet.width, &quiet.dash),
+        stroke: Stroke::dashed(quiet.stroke, quiet.width, &quiet.dash),
         text: quiet.text,
         dot: false,
         glow: Color::NONE,
@@ -168,14 +170,6 @@ fn width_of(style: &Style, hz: Option<f64>) -> f64 {
     let hz = hz.filter(|hz| hz.is_finite()).unwrap_or(0.0).max(0.0);
     let edge = &style.edge;
     (edge.width + edge.per_decade * libm::log10(1.0 + hz)).min(edge.most)
-}
-
-fn line(color: Color, width: f64, dash: &[f64]) -> Stroke {
-    Stroke {
-        color,
-        width,
-        dash: dash.to_vec(),
-    }
 }
 
 #[cfg(test)]

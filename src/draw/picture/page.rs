@@ -3,11 +3,13 @@
 use super::PageOptions;
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::style::Style;
+use crate::draw::text::Fonts;
 use crate::draw::timeline::below::BelowSizes;
 
-/// The page size for which lengths of title, legend and timeline are given.
+/// The page size for which lengths of title, legend and timeline are given: the smallest common size of a screen.
 const STANDARD: Size = Size::new(1280.0, 720.0);
-/// The largest scale of the graph, over its natural size.
+/// The largest scale of the graph, over its natural size: beyond it, the names of a small graph are nearly as
+/// large as the headline.
 const LARGEST: f64 = 1.35;
 
 /// The positions of all parts of the page, equal in every frame.
@@ -45,6 +47,13 @@ pub(crate) struct GraphFit {
     pub(crate) origin: Point,
 }
 
+/// The style, the fonts and the scale that the graph is drawn with.
+pub(crate) struct GraphPen<'a> {
+    pub(crate) style: &'a Style,
+    pub(crate) fonts: &'a Fonts,
+    pub(crate) fit: GraphFit,
+}
+
 impl PageFrame {
     /// The page of these options, with `rows` rows of legend.
     pub(crate) fn new(style: &Style, options: &PageOptions, rows: usize, bottom: Strip) -> Self {
@@ -55,17 +64,20 @@ impl PageFrame {
         if !options.bare {
             title = style.title.height * unit;
             if options.has_legend {
+                // Rows at nearly twice the text's size, so that signs of two rows do not touch.
                 legend = (style.legend.size * 1.9 * rows as f64 + 8.0) * unit;
             }
             if bottom != Strip::Nothing {
                 timeline = below(style, options, bottom).height(&options.timeline);
             }
         }
+        // On a small page the graph keeps nine tenths of each side.
         let margin = (style.page.margin * unit)
             .min(size.w / 20.0)
             .min(size.h / 20.0);
         let top = title;
         let bottom = (size.h - legend - timeline).max(top + 1.0);
+        // The title's bar separates already.
         let above = if options.bare { margin } else { margin / 4.0 };
         let graph = Rect::new(
             margin,
@@ -115,9 +127,11 @@ pub(crate) fn unit(options: &PageOptions) -> f64 {
         return unit;
     }
     let size = options.size;
+    // Below 0.62, the words of the legend would be smaller than 7 pixels.
     let ratio = (size.w / STANDARD.w)
         .min(size.h / STANDARD.h)
         .clamp(0.62, 4.0);
+    // On a page twice as large, words are 1.6 times as large: the rest of it is for the graph.
     if ratio > 1.0 {
         libm::pow(ratio, 0.7)
     } else {

@@ -9,7 +9,7 @@ use crate::base::geometry::{Point, Rect, Size};
 /// a larger drawing a badge is smaller than a point.
 const MOST: usize = 3000;
 
-/// The distance of titles from the left of their frames, and from lines, in pixels of the graph.
+/// The distance of titles from the left of their frames, past its rounded corner, and from lines, in pixels of the graph.
 const INSET: f64 = 8.0;
 const CLEAR: f64 = 3.0;
 
@@ -166,8 +166,8 @@ fn apart(p: Point, a: Point, b: Point) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::draw::picture::measured::{Label, ShownRates};
     use crate::draw::picture::page::GraphFit;
+    use crate::draw::picture::texts::{Label, ShownRates};
     use crate::layout::Route;
 
     fn line(from: Point, to: Point) -> ArrowPath {

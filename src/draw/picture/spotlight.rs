@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::Measured;
 use crate::draw::scene::Group;
 use crate::draw::style::Style;
-use crate::view::{Arrow, Frame, ItemId, Looks, Mark, SeenWindow, Shown};
+use crate::view::{Arrow, Frame, ItemId, Mark, SeenWindow, Shown, ShownRuns};
 
 /// The fewest boxes of a picture that is not seen at a glance.
 const FEWEST: usize = 5;
@@ -32,7 +32,7 @@ impl<'a> Spotlight<'a> {
             return None;
         }
         let changed = seen.items.iter().filter(|shown| is_news(shown));
-        let is_new = |looks: &Looks| looks.at(k).is_some_and(is_news);
+        let is_new = |looks: &ShownRuns| looks.at(k).is_some_and(is_news);
         let rows = view.rows.iter().filter(|row| is_new(&row.shown));
         let news: BTreeSet<ItemId> = changed
             .map(Shown::item)

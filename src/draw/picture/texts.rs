@@ -1,7 +1,9 @@
-//! The words on the picture: badges with counts, and facts about an element.
+//! The words on the picture: badges with counts, labels of boxes and arrows, and facts about an element.
 
 use crate::base::words::{count, rate, rate_change, rate_of, rates};
-use crate::view::{Counts, Shown};
+use crate::draw::style::Body;
+use crate::graph::{ById, State};
+use crate::view::{Arrow, ArrowKind, Counts, Item, ItemKind, Shown, View};
 
 /// The texts of the badges for beginnings, ends and other changes, each with the number of headlines it
 /// counts; empty for none.
@@ -116,6 +118,176 @@ pub(crate) fn facts(shown: &Shown) -> String {
         parts.push(format!("lifecycle {state}"));
     }
     parts.join(", ")
+}
+
+// The words of boxes and arrows.
+
+/// The height of a line of text, relative to its font size: from ascender to descender of the font.
+pub(crate) const LINE: f64 = 1.22;
+/// The height of a rate label, and its width beyond its text, relative to the font size: its ends are half circles, which
+/// letters must not touch.
+pub(crate) const BADGE_HEIGHT: f64 = 1.5;
+pub(crate) const BADGE_PAD: f64 = 1.2;
+/// The least relative difference of a subscription's rate from its topic's for it to be written beside it: less is a
+/// message more or less in a window.
+const OWN_RATE: f64 = 0.15;
+/// The height of the bar of the times at which a node was there, as a share of that of its name: half a stroke of a letter
+/// thicker than a line, so that it is not taken for one.
+pub(crate) const BAR: f64 = 0.3;
+/// The height of a tick over that of the bar: less is no tick, and more touches the name.
+pub(crate) const TICK: f64 = 1.7;
+
+/// The label of a box.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Label {
+    /// The name as drawn.
+    pub(crate) name: String,
+    /// The names of other nodes in the box, below it.
+    pub(crate) others: Vec<String>,
+    /// Whether a smaller line is drawn below it in some window.
+    pub(crate) second: bool,
+    /// Whether a bar of the times at which it was there is drawn below it.
+    pub(crate) has_bar: bool,
+    /// The original name, if the font lacks some of its characters.
+    pub(crate) unshown: Option<String>,
+}
+
+impl Label {
+    /// The height of all its lines in pixels before scaling, with the bar below them.
+    pub(crate) fn height(&self, body: &Body) -> f64 {
+        let bar = if self.has_bar {
+            body.size * BAR * TICK
+        } else {
+            0.0
+        };
+        self.lines(body) + bar
+    }
+
+    /// The height of its lines without the bar.
+    pub(crate) fn lines(&self, body: &Body) -> f64 {
+        let small = if self.second { body.small * LINE } else { 0.0 };
+        body.size * LINE * (1 + self.others.len()) as f64 + small
+    }
+
+    /// The smaller line of a topic in a window without a message.
+    pub(crate) fn silence(&self, shown: &Shown, shown_rates: ShownRates) -> &'static str {
+        match shown.state {
+            _ if shown.is_ghost() || !self.second || shown_rates != ShownRates::Rates => "",
+            State::Latched => "latched",
+            _ => NO_MESSAGE,
+        }
+    }
+}
+
+/// The text instead of a rate if there was no message.
+pub(crate) const NO_MESSAGE: &str = "no msg";
+
+/// A name with the number of topics that are only counted: `imu_driver +2`.
+pub(crate) fn counting(name: String, item: &Item) -> String {
+    match item.counted.len() {
+        0 => name,
+        more => format!("{name} +{more}"),
+    }
+}
+
+/// The rates that a box shows because no arrow does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ShownRates {
+    /// None: it is not a topic.
+    Nothing,
+    /// Changed rates of the whole topic: several nodes publish it, whose arrows show the other rates.
+    Changes,
+    /// All: at most one is ever known to publish it.
+    Rates,
+}
+
+/// The rates that each item shows: all those of a topic, unless several publishers share it; then only those that
+/// changed.
+pub(crate) fn shown_rates(view: &View) -> Vec<ShownRates> {
+    let mut senders = ById::like(&view.items, 0_usize);
+    for arrow in view.arrows.iter().filter(|a| a.kind == ArrowKind::Publish) {
+        if let Some(senders) = senders.get_mut(arrow.to) {
+            *senders += 1;
+        }
+    }
+    let shown_rates = |(item, senders): (&Item, usize)| match item.kind {
+        ItemKind::Node | ItemKind::Namespace => ShownRates::Nothing,
+        ItemKind::Topic | ItemKind::Group if senders > 1 => ShownRates::Changes,
+        ItemKind::Topic | ItemKind::Group => ShownRates::Rates,
+    };
+    view.items.iter().zip(senders).map(shown_rates).collect()
+}
+
+/// The text of an arrow in a window, and whether it is drawn as a rate label because it changed.
+pub(crate) fn arrow_label(
+    arrow: &Arrow,
+    shown: &Shown,
+    from: Option<&Shown>,
+) -> Option<(String, bool)> {
+    if shown.is_ghost() {
+        return None;
+    }
+    let called = if arrow.is_service { "() " } else { " " };
+    let topic = arrow
+        .carries(shown)
+        .map_or_else(String::new, |t| t + called);
+    if let Some((before, now)) = shown.rates.filter(|_| arrow.kind != ArrowKind::Bundle) {
+        return Some((topic + &rate_change(before, now), true));
+    }
+    let rate = rate_in(shown);
+    match arrow.kind {
+        ArrowKind::Publish => rate.map(|rate| (rate, false)),
+        ArrowKind::Subscribe => {
+            let of_topic = from.and_then(|s| s.hz).unwrap_or(0.0);
+            let hz = shown.hz.unwrap_or(0.0);
+            let differs = (hz - of_topic).abs() > OWN_RATE * of_topic.max(hz);
+            rate.filter(|_| differs).map(|rate| (rate, false))
+        }
+        ArrowKind::Direct(_) => {
+            let rate = rate.unwrap_or_default();
+            Some(((topic + &rate).trim_end().to_owned(), false))
+        }
+        // Each of its topics has a row.
+        ArrowKind::Bundle => None,
+    }
+}
+
+/// The smaller line of a box in a window.
+pub(crate) fn second_line(shown: &Shown, shown_rates: ShownRates) -> Option<String> {
+    if let Some(inside) = &shown.inside {
+        return Some(self::inside(inside));
+    }
+    if shown.is_ghost() {
+        return None;
+    }
+    if let Some((number, word)) = shown.members.number() {
+        return Some(count(number, word));
+    }
+    if let Some(state) = &shown.lifecycle {
+        return Some(state.to_string());
+    }
+    match (shown_rates, shown.rates) {
+        (ShownRates::Nothing | ShownRates::Changes, _) => None,
+        (ShownRates::Rates, Some((before, now))) => Some(rate_change(before, now)),
+        (ShownRates::Rates, None) => rate_in(shown),
+    }
+}
+
+/// The rate label of a box in one window: the rate that changed, if neither an arrow nor its smaller line shows it.
+pub(crate) fn rate_label(shown: &Shown, shown_rates: ShownRates) -> Option<String> {
+    let (before, now) = shown.rates.filter(|_| shown_rates == ShownRates::Changes)?;
+    Some(rate_change(before, now))
+}
+
+/// The part of a name inside the namespace in whose box it is drawn.
+pub(crate) fn short_name<'a>(name: &'a str, inside: &str) -> &'a str {
+    let rest = name
+        .strip_prefix(inside)
+        .and_then(|rest| rest.strip_prefix('/'));
+    match rest {
+        Some(rest) if !inside.is_empty() && !rest.is_empty() => rest,
+        _ => name,
+    }
 }
 
 #[cfg(test)]

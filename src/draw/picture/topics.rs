@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use super::measured::LINE;
-use super::texts;
+use super::texts::{self, LINE};
 use crate::base::geometry::Size;
 use crate::base::name::is_vague;
 use crate::base::words;
@@ -13,11 +12,11 @@ use crate::graph::State;
 use crate::view::{Arrow, ItemId, Mark, Shown, TopicRow, View};
 
 /// The most topics that have a row each; if there are more, only those that changed, or the one with the
-/// highest rate.
+/// highest rate. Four rows are as high as a box with its gap.
 const MOST: usize = 4;
 /// The number of letters above which a rate is drawn below its name, so that lines need not be long.
 const LONGEST: usize = 15;
-/// The largest width of a name, in text heights.
+/// The largest width of a name, in text heights, about 28 letters: wider ones would push the layers apart.
 const WIDEST: f64 = 15.0;
 /// The last parts of the names of a group of topics, and of image transports.
 const FAMILIES: [&str; 8] = [

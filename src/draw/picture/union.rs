@@ -3,17 +3,17 @@
 
 use std::collections::BTreeSet;
 
-use super::arrows::{ArrowPath, Arrows, is_badged};
-use super::boxes::{Boxes, ItemBox};
-use super::measured::ShownRates;
-use super::page::GraphFit;
-use super::{Picture, badge, encoded, places, texts};
+use super::arrows::{ArrowPath, is_badged};
+use super::boxes::ItemBox;
+use super::page::{GraphFit, GraphPen};
+use super::texts::{self, ShownRates};
+use super::{Picture, badge, encoded, places};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::{Form, Group};
 use crate::draw::style::Style;
 use crate::evidence::Confidence;
 use crate::graph::State;
-use crate::view::{Arrow, ArrowId, ItemId, ItemKind, Looks, Mark, Shown};
+use crate::view::{Arrow, ArrowId, ItemId, ItemKind, Mark, Shown, ShownRuns};
 
 /// The whole graph, every element once, drawn as active; a painter omits the colours.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -87,29 +87,25 @@ impl Picture<'_> {
             pen: 1.0,
             origin: Point::default(),
         };
-        let boxes = Boxes {
-            style: measured.style,
-            fonts: measured.fonts,
-            fit,
-        };
+        let pen = GraphPen { fit, ..self.pen() };
         let spaces = measured.graph.spaces.iter().zip(&layout.clusters);
         let (cards, tracks, _) = places(measured, layout, fit);
         Union {
             size: layout.size,
             spaces: spaces
-                .map(|(space, place)| boxes.space(space, *place, &encoded(&space.name), None))
+                .map(|(space, place)| pen.space(space, *place, &encoded(&space.name), None))
                 .collect(),
             order: self.order.clone(),
-            arrows: self.union_arrows(tracks, fit),
-            items: self.union_items(cards, &boxes),
+            arrows: self.union_arrows(tracks, &pen),
+            items: self.union_items(cards, &pen),
         }
     }
 
-    fn union_items(&self, cards: Vec<ItemBox>, boxes: &Boxes<'_>) -> Vec<UnionElement> {
+    fn union_items(&self, cards: Vec<ItemBox>, pen: &GraphPen<'_>) -> Vec<UnionElement> {
         let view = self.measured.view;
         let mut marks = vec![BTreeSet::new(); view.items.len()];
         let mut latched = BTreeSet::new();
-        for shown in view.items_shown.iter().flat_map(Looks::distinct) {
+        for shown in view.items_shown.iter().flat_map(ShownRuns::distinct) {
             if shown.state == State::Latched {
                 latched.insert(shown.id as usize);
             }
@@ -126,12 +122,12 @@ impl Picture<'_> {
                 let mut shown = plain(is_live.then_some(1.0));
                 // The line is filled in regardless of its content.
                 shown.lifecycle = is_live.then(|| "-".into());
-                let mut group = boxes.item(item, &card, &shown);
+                let mut group = pen.item(item, &card, &shown);
                 let is_rate = |m: &Mark| matches!(m, Mark::Faster | Mark::Slower);
                 let shows_changes =
                     card.shown_rates == ShownRates::Changes && marks.iter().any(is_rate);
                 if shows_changes {
-                    group.text(boxes.rate_label_text(card.place, "-"));
+                    group.text(pen.rate_label_text(card.place, "-"));
                 }
                 UnionElement {
                     group,
@@ -139,7 +135,7 @@ impl Picture<'_> {
                     shows_changes,
                     rect: card.place,
                     name: label.unshown.clone(),
-                    bar: is_latched.then(|| boxes.latch_of(item.kind, card.place)),
+                    bar: is_latched.then(|| pen.latch_of(item.kind, card.place)),
                     badge: card.badge,
                     marks,
                 }
@@ -147,13 +143,8 @@ impl Picture<'_> {
             .collect()
     }
 
-    fn union_arrows(&self, tracks: Vec<ArrowPath>, fit: GraphFit) -> Vec<UnionElement> {
+    fn union_arrows(&self, tracks: Vec<ArrowPath>, pen: &GraphPen<'_>) -> Vec<UnionElement> {
         let (view, plan) = (self.measured.view, &self.measured.graph.plan);
-        let arrows = Arrows {
-            style: self.measured.style,
-            fonts: self.measured.fonts,
-            fit,
-        };
         let mut marks = vec![BTreeSet::new(); view.arrows.len()];
         for ((arrow, looks), marks) in view.arrows.iter().zip(&view.arrows_shown).zip(&mut marks) {
             for (window, shown) in looks.runs() {
@@ -173,14 +164,12 @@ impl Picture<'_> {
                 let shown = plain(link.label.map(|_| 1.0));
                 let is_starved = looks.distinct().iter().any(|look| look.is_starved);
                 UnionElement {
-                    group: arrows.arrow(arrow, &track, &shown, [None; 2]),
+                    group: pen.arrow(arrow, &track, &shown, [None; 2]),
                     is_live: link.label.is_some(),
-                    shows_changes: false,
-                    rect: Rect::default(),
-                    name: None,
-                    bar: is_starved.then(|| arrows.stop(&track)),
+                    bar: is_starved.then(|| pen.stop(&track)),
                     badge: track.badge,
                     marks,
+                    ..UnionElement::default()
                 }
             })
             .collect()

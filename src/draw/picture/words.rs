@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use super::Picture;
 use super::union::{Union, UnionElement};
 use crate::base::geometry::{Point, Rect};
-use crate::draw::scene::{Anchor, Form, Group, Shape, Text};
+use crate::draw::scene::{Anchor, Font, Form, Group, Shape, Text};
 use crate::draw::style::Color;
 use crate::draw::text::Weight;
 use crate::graph::{ById, Id as _};
 use crate::view::DrawnPart;
-use crate::view::{ArrowId, ItemId, ItemKind, Looks, View};
+use crate::view::{ArrowId, ItemId, ItemKind, ShownRuns, View};
 
 impl Picture<'_> {
     /// The union of the view of which this picture's view is a part.
@@ -30,7 +30,7 @@ impl Picture<'_> {
                 None => self.layout.boxes.get(part.view.items.len()),
             };
             let place = place.copied().unwrap_or_default();
-            let mut words = self.boxes().footer_words(footer, place).into_iter();
+            let mut words = self.pen().footer_words(footer, place).into_iter();
             let (first, mut around) = words.next().unwrap_or_default();
             let first = self.word(first, around);
             for ((word, rect), item) in words.zip(&also.items) {
@@ -39,7 +39,7 @@ impl Picture<'_> {
                     let looks = whole
                         .items_shown
                         .get(ItemId::of(*at))
-                        .map_or(&[][..], Looks::distinct);
+                        .map_or(&[][..], ShownRuns::distinct);
                     union.items[*at] = UnionElement {
                         group: self.word(word, rect),
                         rect,
@@ -49,10 +49,7 @@ impl Picture<'_> {
                     };
                 }
             }
-            let mut frame = Group {
-                class: "also".to_owned(),
-                ..Group::default()
-            };
+            let mut frame = Group::new("", "also");
             frame.shape(Shape::filled(Form::Rect(around, 0.0), Color::NONE));
             frame.pieces.extend(first.pieces);
             union.spaces.push(frame);
@@ -63,15 +60,9 @@ impl Picture<'_> {
     fn word(&self, text: String, rect: Rect) -> Group {
         let style = self.measured.style;
         let mut group = Group::default();
-        group.text(Text {
-            at: Point::new(rect.x, rect.bottom() - style.edge.size * 0.3),
-            anchor: Anchor::Start,
-            size: style.edge.size,
-            weight: Weight::Regular,
-            color: style.page.quiet,
-            halo: None,
-            text,
-        });
+        let at = Point::new(rect.x, rect.bottom() - style.edge.size * 0.3);
+        let font = Font::new(style.edge.size, Weight::Regular, style.page.quiet);
+        group.text(Text::new(Anchor::Start, at, font, text));
         group
     }
 }

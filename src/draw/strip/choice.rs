@@ -14,7 +14,7 @@ pub enum Choice {
     Windows(Vec<usize>),
 }
 
-/// The most windows on a strip that are chosen for the user.
+/// The most windows on a strip that are chosen for the user: of three columns, four rows.
 const MOST: usize = 12;
 impl Choice {
     /// Reads `3x2`, `changes` or `0,4,9`.

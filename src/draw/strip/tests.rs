@@ -7,7 +7,7 @@ use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::Confidence;
 use crate::graph::{Element, Elements, NodeId, State};
 use crate::layout;
-use crate::view::{Frame, Headline, Item, ItemKind, Looks, Mark, Phrase, Shown};
+use crate::view::{Frame, Headline, Item, ItemKind, Mark, Phrase, Shown, ShownRuns};
 
 /// Four minutes in which one node exists and another appears and vanishes.
 fn two_nodes() -> (Mission, View) {
@@ -63,8 +63,8 @@ fn two_nodes() -> (Mission, View) {
     let view = View {
         items: (0..).zip(["/driver", "/planner"]).map(item).collect(),
         items_shown: vec![
-            Looks::of(marks.iter().map(|_| Some(&driver))),
-            Looks::of(planner.iter().map(Option::as_ref)),
+            ShownRuns::of(marks.iter().map(|_| Some(&driver))),
+            ShownRuns::of(planner.iter().map(Option::as_ref)),
         ]
         .into(),
         frames: marks.into_iter().enumerate().map(frame).collect(),

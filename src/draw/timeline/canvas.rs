@@ -1,7 +1,9 @@
 //! The canvas that figures are drawn on: lengths in millimetres, four kinds of type, one palette; it becomes a scene.
 
 use crate::base::geometry::{Point, Rect, Size};
-use crate::draw::scene::{Anchor, Form, Group, Piece, Scene, Shape, Step, Stroke, Text, polygon};
+use crate::draw::scene::{
+    Anchor, Font, Form, Group, Piece, Scene, Shape, Step, Stroke, Text, polygon,
+};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::mission::EventId;
@@ -135,11 +137,7 @@ impl<'a> PaperCanvas<'a> {
     }
 
     fn open(&mut self, id: &str, class: &str, data: Vec<(&'static str, String)>) {
-        self.groups.push(Group {
-            class: class.to_owned(),
-            data,
-            ..Group::named(id)
-        });
+        self.groups.push(Group::new(id, class).with(data));
     }
 
     fn group(&mut self) -> Option<&mut Group> {
@@ -215,15 +213,10 @@ impl<'a> PaperCanvas<'a> {
     ) {
         let (size, weight) = self.size(of);
         let baseline = at.y + self.cap(of) / 2.0;
-        let text = Text {
-            at: Point::new(at.x * self.scale, baseline * self.scale),
-            anchor,
-            size: size * MM_PER_PT * self.scale,
-            weight,
-            color,
-            halo,
-            text: self.fonts.shown(text).into_owned(),
-        };
+        let at = Point::new(at.x * self.scale, baseline * self.scale);
+        let font = Font::new(size * MM_PER_PT * self.scale, weight, color);
+        let text = Text::new(anchor, at, font, self.fonts.shown(text));
+        let text = Text { halo, ..text };
         if let Some(group) = self.group() {
             group.text(text);
         }
@@ -239,7 +232,7 @@ impl<'a> PaperCanvas<'a> {
     pub(crate) fn frame(&mut self, rect: Rect, radius: f64, fill: Color, stroke: &Stroke) {
         let form = Form::Rect(rect.scaled(self.scale), radius * self.scale);
         let stroke = stroke.scaled(self.scale);
-        self.shape(Shape { form, fill, stroke });
+        self.shape(Shape::new(form, fill, stroke));
     }
 
     /// Draws a disc with a line around.
@@ -247,7 +240,7 @@ impl<'a> PaperCanvas<'a> {
         let rect = Rect::around(at, Size::new(2.0 * radius, 2.0 * radius));
         let form = Form::Ellipse(rect.scaled(self.scale));
         let stroke = stroke.scaled(self.scale);
-        self.shape(Shape { form, fill, stroke });
+        self.shape(Shape::new(form, fill, stroke));
     }
 
     /// Draws a straight line.
@@ -269,7 +262,7 @@ impl<'a> PaperCanvas<'a> {
         let at = |p: Point| Point::new(p.x * self.scale, p.y * self.scale);
         let form = Form::Path(steps.iter().map(|step| step.mapped(at)).collect());
         let stroke = stroke.scaled(self.scale);
-        self.shape(Shape { form, fill, stroke });
+        self.shape(Shape::new(form, fill, stroke));
     }
 
     /// Draws a filled head of an arrow that ends at `tip`, coming from `from`.

@@ -11,6 +11,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::base::ids::grouped;
 use crate::base::name::{is_player, is_recorder, last_part, namespace};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words::{count, some_of, worded};
@@ -100,11 +101,8 @@ fn draw_named(
     recorded: &RecordedTopics,
     named: &NamedNodes,
 ) -> NamedCode {
-    let mut by_name: BTreeMap<&str, Vec<&Instance>> = BTreeMap::new();
-    for instance in &code.instances {
-        let own = by_name.entry(last_part(&instance.name)).or_default();
-        own.push(instance);
-    }
+    let instances = code.instances.iter();
+    let by_name = grouped(instances.map(|of| (last_part(&of.name), of)));
     let mut all = NamedCode::default();
     for (text, (node, words)) in named {
         let name = last_part(text);
@@ -433,11 +431,8 @@ fn infer_only(code: &Code, known: &mut Conclusions<'_>, bag: &BagTopics<'_>) -> 
     let candidates = candidates(code, bag);
     let places = places(code, bag.recorded, &candidates);
     let launches = Launches::new(code, bag.named, &candidates);
-    let mut by_edge: BTreeMap<(Role, Name), Vec<&Candidate<'_>>> = BTreeMap::new();
-    for candidate in &candidates {
-        let edge = (candidate.found.role, candidate.found.topic);
-        by_edge.entry(edge).or_default().push(candidate);
-    }
+    let edge = |of: &Candidate<'_>| (of.found.role, of.found.topic);
+    let by_edge = grouped(candidates.iter().map(|of| (edge(of), of)));
     let judged = by_edge.into_iter().map(|(edge, candidates)| {
         let reason = reason(&candidates, known, bag, (&places[&edge], &launches));
         (edge.0, reason, candidates)

@@ -16,7 +16,7 @@ use crate::draw::timeline::marks::RowMark;
 use crate::graph::Element;
 use crate::mission::EventId;
 use crate::mission::event_log::{Event, Kind, LogFormat, LogLine, LogRow, row_lines};
-use crate::view::{Frame, Headline, Lasting};
+use crate::view::{Frame, Headline, OngoingEvent};
 
 /// The headlines of a window, and the elements that are back in it: its index, the number of headlines, the texts of the
 /// three badges, its lines, and the film's headline.
@@ -90,7 +90,7 @@ impl PageChanges {
         // Two missions have no common time.
         let secs =
             |frame: &Frame, at| clock.secs(if view.compares { frame.span.start } else { at });
-        let back = |frame: &Frame, last: &Lasting| {
+        let back = |frame: &Frame, last: &OngoingEvent| {
             let (end, away) = (last.ended?, last.ended?.since(last.since));
             let (node, topic) = mission.elements.names(last.what);
             let name = visible(node.or(topic).unwrap_or_default());
@@ -121,7 +121,7 @@ impl PageChanges {
         let frames = frames.filter(|(_, frame)| frame.is_changed());
         let windows = frames.map(|(at, frame)| {
             let mut counts = change_counts(&frame.counts).map(|(text, _)| text);
-            let returns = frame.lasting.iter().filter_map(|last| back(frame, last));
+            let returns = frame.ongoing.iter().filter_map(|last| back(frame, last));
             let returns: Vec<ChangeLine> = returns.collect();
             if frame.headlines.is_empty() {
                 counts[2] = format!("{} back", returns.len());

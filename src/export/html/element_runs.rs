@@ -10,7 +10,7 @@ use crate::base::words;
 use crate::draw::paint::classes::ElementLook;
 use crate::evidence::Confidence;
 use crate::graph::State;
-use crate::view::{Arrow, Looks, Mark, Shown, TopicRow, View};
+use crate::view::{Arrow, Mark, Shown, ShownRuns, TopicRow, View};
 
 /// The values of one item or arrow over the windows (indices into [`View::frames`]); before its first run a list has
 /// value 0.
@@ -50,7 +50,7 @@ impl ViewRuns {
     pub(crate) fn of(view: &View, label: impl Fn(&Shown, Option<&Arrow>) -> String) -> Self {
         let mut classes = ValueTable::starting_with(None);
         let mut labels = ValueTable::starting_with(String::new());
-        let mut runs = |all: &[Looks], arrows| {
+        let mut runs = |all: &[ShownRuns], arrows| {
             let mut recorder = RunRecorder {
                 classes: &mut classes,
                 labels: &mut labels,
@@ -166,7 +166,7 @@ struct RunRecorder<'a, F> {
 }
 
 impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
-    fn runs(&mut self, looks: &Looks) -> ElementRuns {
+    fn runs(&mut self, looks: &ShownRuns) -> ElementRuns {
         let mut life = ElementRuns::default();
         // The text of each rate is cached: formatting takes time, and most rates recur.
         let mut known: BTreeMap<_, u32> = BTreeMap::new();
@@ -266,7 +266,7 @@ mod tests {
                 topics: Vec::new(),
                 is_service: false,
             }]),
-            arrows_shown: vec![Looks::of(story.iter().map(Option::as_ref))].into(),
+            arrows_shown: vec![ShownRuns::of(story.iter().map(Option::as_ref))].into(),
             ..View::default()
         };
         ViewRuns::of(&view, |shown, _| format!("{:.0}", shown.hz.unwrap_or(0.0)))
@@ -324,7 +324,7 @@ mod tests {
         };
         let story = [shown(Some(7.1)), shown(None), shown(Some(7.1))];
         let view = View {
-            items_shown: vec![Looks::of(story.iter().map(Some))].into(),
+            items_shown: vec![ShownRuns::of(story.iter().map(Some))].into(),
             ..View::default()
         };
         let label = |shown: &Shown, _: Option<&Arrow>| {

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use crate::base::words;
 use crate::draw::style::{BUILTIN, Style};
 use crate::export::{markdown, mermaid};
-use crate::view::{ArrowId, ItemId, Looks, Mark, SeenWindow, Shown, View};
+use crate::view::{ArrowId, ItemId, Mark, SeenWindow, Shown, ShownRuns, View};
 
 /// The most edges that are drawn.
 const MOST_EDGES: usize = 60;
@@ -104,12 +104,12 @@ pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
 }
 
 /// The outcome of each element up to window `last`: its last state, with a mark for the whole mission.
-fn ends(all: &[Looks], last: usize) -> BTreeMap<u32, Shown> {
+fn ends(all: &[ShownRuns], last: usize) -> BTreeMap<u32, Shown> {
     let ends = all.iter().filter_map(|looks| end(looks, last));
     ends.map(|shown| (shown.id, shown)).collect()
 }
 
-fn end(looks: &Looks, last: usize) -> Option<Shown> {
+fn end(looks: &ShownRuns, last: usize) -> Option<Shown> {
     let is_gone = |shown: &Shown| shown.mark == Some(Mark::Removed);
     let runs = || looks.runs().filter_map(|(_, shown)| shown);
     let end = runs().rev().find(|shown| !is_gone(shown));

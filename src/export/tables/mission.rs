@@ -2,10 +2,9 @@
 
 use crate::base::table::{Batch, ColumnKind, ColumnOf, TableCell, columns};
 use crate::base::time::{Span, Stamp};
-use crate::graph::diff::Change;
 use crate::graph::{Element, ElementState, Id as _, Node, NodeId, NodeLoad, Topic};
-use crate::mission::Mission;
-use crate::mission::event_log::{Detail, Event, EventId, described};
+use crate::mission::event_log::{Detail, Event, EventId};
+use crate::mission::{Change, Mission};
 
 /// A function that takes a row.
 pub(super) type RowTaker<'a> = &'a mut dyn FnMut(&[TableCell<'_>]);
@@ -42,7 +41,7 @@ pub(super) const TABLES: &[Table] = &[
         fill: |all, row| {
             for (at, window) in all.windows.iter().enumerate() {
                 let changes = window.changes.iter();
-                changes.for_each(|one| put(all, CHANGES, &WindowChange::new(at, one), row));
+                changes.for_each(|one| put(all, CHANGES, &(at, one.clone()), row));
             }
         },
     },
@@ -190,46 +189,23 @@ fn topic_of<'a>(mission: &'a Mission, one: &Seen) -> Option<&'a Topic> {
     }
 }
 
-/// A change from one window to the next.
-struct WindowChange {
-    window: usize,
-    kind: &'static str,
-    what: Element,
-    time: Option<Stamp>,
-    detail: Detail,
-}
-
-impl WindowChange {
-    fn new(window: usize, change: &Change) -> Self {
-        let (_, what, time, detail) = described(change);
-        Self {
-            window,
-            kind: change.word(),
-            what,
-            time,
-            detail,
-        }
-    }
-
-    fn span(&self, mission: &Mission) -> Span {
-        mission.windows[self.window].span
-    }
-}
+/// A change, and the index of its window.
+type WindowChange = (usize, Change);
 
 const CHANGES: &[Column<WindowChange>] = columns! {
-    "win" I64 |all, one| TableCell::count(all.windows[one.window].index);
-    "start_ns" Time |all, one| start(one.span(all));
-    "end_ns" Time |all, one| end(one.span(all));
-    "length_ns" I64 |all, one| length(one.span(all));
-    "kind" Text |_, one| TableCell::text(one.kind);
-    "what" Text |_, one| what(one.what);
-    "node" Text |all, one| node(all, one.what);
-    "topic" Text |all, one| topic(all, one.what);
-    "time_ns" Time |_, one| time(one.time);
-    "from_hz" F64 |_, one| float(rates(&one.detail).0);
-    "to_hz" F64 |_, one| float(rates(&one.detail).1);
-    "from_value" Text |all, one| values(all, &one.detail).0;
-    "to_value" Text |all, one| values(all, &one.detail).1;
+    "win" I64 |all, one| TableCell::count(all.windows[one.0].index);
+    "start_ns" Time |all, one| start(all.windows[one.0].span);
+    "end_ns" Time |all, one| end(all.windows[one.0].span);
+    "length_ns" I64 |all, one| length(all.windows[one.0].span);
+    "kind" Text |_, one| TableCell::text(one.1.word());
+    "what" Text |_, one| what(one.1.what);
+    "node" Text |all, one| node(all, one.1.what);
+    "topic" Text |all, one| topic(all, one.1.what);
+    "time_ns" Time |_, one| time(one.1.time);
+    "from_hz" F64 |_, one| float(rates(&one.1.detail).0);
+    "to_hz" F64 |_, one| float(rates(&one.1.detail).1);
+    "from_value" Text |all, one| values(all, &one.1.detail).0;
+    "to_value" Text |all, one| values(all, &one.1.detail).1;
 };
 
 const EVENTS: &[Column<EventId>] = columns! {
@@ -292,7 +268,7 @@ fn values<'a>(mission: &Mission, detail: &'a Detail) -> (TableCell<'a>, TableCel
     };
     match detail {
         Detail::None | Detail::Rates { .. } => (TableCell::Null, TableCell::Null),
-        Detail::Count(many) => (TableCell::text(""), TableCell::text(many.to_string())),
+        Detail::Count { count } => (TableCell::text(""), TableCell::text(count.to_string())),
         Detail::Senders { from, to } => (names(from), names(to)),
         Detail::Values { from, to } => (TableCell::text(&**from), TableCell::text(&**to)),
     }

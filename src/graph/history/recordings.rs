@@ -1,8 +1,9 @@
 //! The recordings of a mission: the time that each covers, and the nodes that several contain at the same time. For example, a
 //! recording that is split every 60 s is one recording of five files, and `/camera` in two bags of two robots is two nodes.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
+use crate::base::ids::grouped;
 use crate::base::name::is_quiet;
 use crate::base::rhythm::OUT_OF_ORDER_NS;
 use crate::base::time::Stamp;
@@ -61,22 +62,16 @@ pub(crate) fn recordings(recorded: &Recorded, streams: &[Stream]) -> Vec<Option<
 
 /// The nodes that several recordings contain at the same time as publishers of one topic: of several robots,
 /// or recorded twice.
-#[expect(
-    clippy::type_complexity,
-    reason = "a short-lived list of when each bag contains a node and topic"
-)]
 pub(crate) fn doubled(recorded: &Recorded, streams: &[Stream]) -> BTreeSet<Name> {
-    let mut seen: BTreeMap<(Name, Name), Vec<(Stamp, Stamp, usize)>> = BTreeMap::new();
     let is_named = |s: &&Stream| s.trust == Reliability::Whole && !s.latched;
     let is_quiet = |s: &Stream| is_quiet(s.connection.topic.as_str());
-    for stream in streams.iter().filter(is_named).filter(|s| !is_quiet(s)) {
-        let times = recorded.messages.bounds(stream.times);
-        if let (Some(node), Some((from, to))) = (stream.publisher, times) {
-            let all = seen.entry((node, stream.topic)).or_default();
-            all.push((from, to, stream.bag));
-        }
-    }
-    let all = seen.into_iter();
+    let seen = |stream: &Stream| {
+        let (from, to) = recorded.messages.bounds(stream.times)?;
+        let key = (stream.publisher?, stream.topic);
+        Some((key, (from, to, stream.bag)))
+    };
+    let named = streams.iter().filter(is_named).filter(|s| !is_quiet(s));
+    let all = grouped(named.filter_map(seen)).into_iter();
     all.filter_map(|((node, _), all)| overlap(all).then_some(node))
         .collect()
 }

@@ -2,11 +2,11 @@
 //! messages are sent again. For example, `/scan` counts to 4711, is silent for 3 s and continues with 0, while no other topic of
 //! `/lidar` had a message in the gap: `/lidar` ended at the last message and began again with the next.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::io;
 
 use crate::base::error::Result;
-use crate::base::ids::Few;
+use crate::base::ids::{Few, grouped};
 use crate::base::name::is_log;
 use crate::base::rhythm::{DECLARED_NS, FEWEST, GAP, GAP_NS};
 use crate::base::time::Stamp;
@@ -228,12 +228,10 @@ pub(crate) fn restarts(
     let falls = nodes.with_ids();
     let falls = falls.map(|(node, own)| Ok((node, falls_of(recorded, findings, node, own)?)));
     let falls: Few<Name, Vec<Fall>> = falls.collect::<io::Result<_>>()?;
-    let mut alike: BTreeMap<_, Vec<(Name, &Fall)>> = BTreeMap::new();
-    for (node, of) in falls.with_ids() {
-        for fall in of.iter().filter(|fall| fall.first.stamp != 0) {
-            alike.entry(fall.header()).or_default().push((node, fall));
-        }
-    }
+    let of_all = falls.with_ids();
+    let of_all = of_all.flat_map(|(node, of)| of.iter().map(move |fall| (node, fall)));
+    let stamped = of_all.filter(|(_, fall)| fall.first.stamp != 0);
+    let alike = grouped(stamped.map(|(node, fall)| (fall.header(), (node, fall))));
     let said = said(&findings.inferences);
     let mut all = declared(&said);
     for (node, own) in nodes.with_ids() {
@@ -315,12 +313,8 @@ fn falls_of(
         }
         let streams = numbered(recorded, one)?;
         // Between two messages, possibly of two parts of a recording, and the gaps between them.
-        let mut breaks: BTreeMap<(Place, Place), Vec<(Stamp, Stamp)>> = BTreeMap::new();
-        for gap in &gaps {
-            if let Some(places) = around_all(&streams, *gap) {
-                breaks.entry(places).or_default().push(*gap);
-            }
-        }
+        let around = |gap: &_| Some((around_all(&streams, *gap)?, *gap));
+        let mut breaks = grouped(gaps.iter().filter_map(around));
         if logs(recorded, one) {
             // Its numbers are those of all log records of a process, which have no rhythm.
             breaks.extend(between_records(recorded, &streams).map(|places| (places, Vec::new())));

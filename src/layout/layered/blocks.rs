@@ -14,7 +14,7 @@ use crate::layout::routes::around::{End, Map, meets};
 use crate::layout::routes::{PORT_STEP, PORTS};
 use crate::layout::spacing::{PADDING, turned};
 use crate::layout::{
-    Component, Layout, LayoutOptions, Link, Orientation, Outline, Plan, Route, Vertex,
+    Component, Layout, LayoutOptions, Link, Orientation, Outline, PartTask, Plan, Route, Vertex,
 };
 
 /// The shapes, width over height, of the pages on which the contents of namespaces are laid out: columns, squares, rows.
@@ -25,17 +25,11 @@ const PIECES: u32 = 3;
 /// The part with its outermost namespaces as blocks, in the way that is judged best, and its quality: with all contents
 /// on pages of one shape, and for a drawing that fills the page, each in its own. `None` if it has fewer than two
 /// namespaces, or something is too large.
-pub(crate) fn best(
-    plan: &Plan,
-    options: &LayoutOptions,
-    part: &Component,
-    orientation: Orientation,
-    quality: impl Fn(&PlacedPart) -> f64,
-) -> Option<(f64, PlacedPart)> {
-    let blocks = Blocks::new(plan, options, part, orientation)?;
+pub(crate) fn best(task: PartTask<'_>) -> Option<(f64, PlacedPart)> {
+    let blocks = Blocks::new(task)?;
     let judged = |shapes: Vec<usize>| {
         let placed = blocks.placed(&shapes)?;
-        Some((quality(&placed), placed, shapes))
+        Some((task.judged(&placed), placed, shapes))
     };
     let better = |best: (f64, PlacedPart, Vec<usize>), next: (f64, PlacedPart, Vec<usize>)| {
         if next.0 > best.0 { next } else { best }
@@ -43,7 +37,7 @@ pub(crate) fn best(
     let many = blocks.contents.len();
     let equal = (0..SHAPES.len()).map(|shape| vec![shape; many]);
     let mut best = equal.filter_map(judged).reduce(better)?;
-    for at in (0..many).filter(|_| options.is_tight) {
+    for at in (0..many).filter(|_| task.options.is_tight) {
         for shape in 0..SHAPES.len() {
             let mut shapes = best.2.clone();
             if blocks.contents[at][shape].layout.size != blocks.contents[at][shapes[at]].layout.size
@@ -64,23 +58,16 @@ struct Contents {
 
 /// A part with the contents of its outermost namespaces laid out in each shape.
 struct Blocks<'a> {
-    plan: &'a Plan,
-    options: &'a LayoutOptions,
-    part: &'a Component,
-    orientation: Orientation,
+    task: PartTask<'a>,
     cut: Cut,
     /// The contents of each namespace, in each shape.
     contents: Vec<Vec<Contents>>,
 }
 
 impl<'a> Blocks<'a> {
-    fn new(
-        plan: &'a Plan,
-        options: &'a LayoutOptions,
-        part: &'a Component,
-        orientation: Orientation,
-    ) -> Option<Self> {
-        let cut = Cut::new(part)?;
+    fn new(task: PartTask<'a>) -> Option<Self> {
+        let options = task.options;
+        let cut = Cut::new(task.part)?;
         let laid_out = |space: usize, shape: f64| {
             let page = Size::new(options.page.h * shape, options.page.h);
             // On a page of its own it may be as small as it likes, unless it is a sketch.
@@ -94,9 +81,8 @@ impl<'a> Blocks<'a> {
                 least,
                 ..*options
             };
-            let sub = Subplan::new(plan, part, space, |v| cut.space[v] == space);
-            let draft = Draft::new(&sub.plan, &options)?;
-            let (_, layout) = draft.assembled(&sub.plan, &options, orientation);
+            let sub = Subplan::new(task.plan, task.part, space, |v| cut.space[v] == space);
+            let (_, layout) = Draft::new(&sub.plan, &options)?.assembled(task.orientation);
             Some(Contents { sub, layout })
         };
         let spaces = cut.spaces.par_iter();
@@ -109,17 +95,14 @@ impl<'a> Blocks<'a> {
         let contents: Option<Vec<Vec<Contents>>> = contents.collect();
         Some(Self {
             contents: contents?,
-            plan,
-            options,
-            part,
-            orientation,
+            task,
             cut,
         })
     }
 
     /// The part with the contents of each namespace in one of the shapes; `None` if a route is blocked.
     fn placed(&self, shapes: &[usize]) -> Option<PlacedPart> {
-        let (plan, part, cut) = (self.plan, self.part, &self.cut);
+        let (PartTask { plan, part, .. }, cut) = (self.task, &self.cut);
         let chosen = self.contents.iter().zip(shapes);
         let chosen: Vec<&Contents> = chosen.map(|(all, shape)| &all[*shape]).collect();
         let frames = chosen.iter().zip(&cut.spaces).map(|(contents, space)| {
@@ -129,8 +112,8 @@ impl<'a> Blocks<'a> {
         });
         let frames: Vec<Rect> = frames.collect();
         let outer = cut.plan(plan, part, &frames);
-        let draft = Draft::new(&outer, self.options)?;
-        let (_, layout) = draft.assembled(&outer, self.options, self.orientation);
+        let draft = Draft::new(&outer, self.task.options)?;
+        let (_, layout) = draft.assembled(self.task.orientation);
         let mut placed = PlacedPart::unplaced(part);
         let (spaces, free) = layout.boxes.split_at(frames.len());
         for (at, place) in spaces.iter().enumerate() {
@@ -145,7 +128,7 @@ impl<'a> Blocks<'a> {
             placed.routes[link] = route;
         }
         // The way between along and across and the page is the same in both directions.
-        let mut placed = placed.on_page(self.orientation);
+        let mut placed = placed.on_page(self.task.orientation);
         let routes = placed.routes.clone();
         let turns = cut.connect(plan, part, &mut placed, &[])?;
         // Around words as well, if nothing is in the way there: that is no reason to prefer another drawing.
@@ -159,7 +142,7 @@ impl<'a> Blocks<'a> {
         for (at, link) in part.links.iter().enumerate() {
             let size = plan.links[*link]
                 .label
-                .map(|size| turned(size, self.orientation));
+                .map(|size| turned(size, self.task.orientation));
             let label = placed.routes[at].label.zip(size);
             let label = label.map(|(middle, size)| Rect::around(middle, size));
             let is_crossed = |label: Rect| {
@@ -171,15 +154,16 @@ impl<'a> Blocks<'a> {
                 placed.routes[at].label = None;
             }
         }
-        Some(placed.on_page(self.orientation))
+        Some(placed.on_page(self.task.orientation))
     }
 
     /// The words at the bottom left of namespaces, x along the edges and y across.
     fn words(&self, placed: &PlacedPart) -> Vec<Rect> {
-        let clusters = self.part.clusters.iter().zip(&placed.clusters);
+        let task = &self.task;
+        let clusters = task.part.clusters.iter().zip(&placed.clusters);
         let words = clusters.map(|(&at, frame)| {
-            let size = self.plan.clusters[at].footer;
-            match self.orientation {
+            let size = task.plan.clusters[at].footer;
+            match task.orientation {
                 Orientation::LeftRight => {
                     let corner = (frame.x + PADDING, frame.bottom() - size.h);
                     Rect::new(corner.0, corner.1, size.w, size.h)

@@ -4,17 +4,12 @@ use super::subplan::Subplan;
 use super::{Draft, PlacedPart, parts};
 use crate::base::geometry::{Point, Rect};
 use crate::layout::spacing::PADDING;
-use crate::layout::{Component, LayoutOptions, Orientation, Plan};
+use crate::layout::{Orientation, PartTask};
 
 /// The part with its pieces packed inside the frames of the namespaces around all of it; `None` if there is
 /// no such namespace, or no benefit: a single piece that is not `long`.
-pub(crate) fn inside(
-    plan: &Plan,
-    options: &LayoutOptions,
-    part: &Component,
-    is_long: bool,
-    orientation: Orientation,
-) -> Option<PlacedPart> {
+pub(crate) fn inside(task: PartTask<'_>, is_long: bool) -> Option<PlacedPart> {
+    let (plan, part) = (task.plan, task.part);
     let root = part.root();
     if root == 0 {
         return None;
@@ -23,8 +18,8 @@ pub(crate) fn inside(
     if !is_long && parts::parts(&inner.plan).len() < 2 {
         return None;
     }
-    let draft = Draft::new(&inner.plan, options)?;
-    let (crossings, layout) = draft.assembled(&inner.plan, options, orientation);
+    let draft = Draft::new(&inner.plan, task.options)?;
+    let (crossings, layout) = draft.assembled(task.orientation);
     let mut placed = PlacedPart::unplaced(part);
     inner.put(&layout, Point::default(), &mut placed);
     let mut frame = Rect::new(0.0, 0.0, layout.size.w, layout.size.h);

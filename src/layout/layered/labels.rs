@@ -20,7 +20,7 @@ const EFFORT: u64 = 20_000_000;
 /// not avoided. Long edges of a drawing with tens of thousands of boxes in a column pass through thousands
 /// each.
 const CELLS: usize = 2_000_000;
-/// The space between an edge and a label beside it.
+/// The space between an edge and a label beside it: less than between two edges, so that it is the label of this one.
 const ASIDE: f64 = 2.0;
 /// The cost of a label that hides most of its own edge, and of one beside it that touches it.
 const HIDING: f64 = 4.0;

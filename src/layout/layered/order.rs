@@ -12,8 +12,14 @@ const PATIENCE: usize = 6;
 /// The largest number of times that the best order is perturbed.
 const SHAKES: usize = 8;
 
-/// The best order found and its number of crossings, borders of clusters included; see [`Search`].
-pub(crate) fn order(layers: &Layers, effort: usize) -> (LayerRows, u64) {
+/// An order of the items in each layer, and its number of crossings, borders of clusters included.
+pub(crate) struct LayerOrder {
+    pub(crate) rows: LayerRows,
+    pub(crate) crossings: u64,
+}
+
+/// The best order found; see [`Search`].
+pub(crate) fn order(layers: &Layers, effort: usize) -> LayerOrder {
     Search::new(layers, effort).finished()
 }
 
@@ -44,13 +50,16 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The best order so far and its number of crossings.
-    pub(crate) fn found(&self) -> (LayerRows, u64) {
-        (self.sorter.rows(&self.best.0), self.best.1)
+    /// The best order so far.
+    pub(crate) fn found(&self) -> LayerOrder {
+        LayerOrder {
+            rows: self.sorter.rows(&self.best.0),
+            crossings: self.best.1,
+        }
     }
 
     /// The best order found within the effort.
-    pub(crate) fn finished(mut self) -> (LayerRows, u64) {
+    pub(crate) fn finished(mut self) -> LayerOrder {
         if self.effort > 0 {
             self.improve_flat();
         }
@@ -205,7 +214,7 @@ mod tests {
 
     #[test]
     fn avoidable_crossings_are_removed() {
-        let (rows, crossings) = order(&crossed(), 1000);
+        let LayerOrder { rows, crossings } = order(&crossed(), 1000);
         assert_eq!(crossings, 0);
         assert_eq!(rows.iter().map(Vec::len).collect::<Vec<_>>(), [2, 2, 2]);
     }

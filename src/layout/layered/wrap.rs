@@ -7,9 +7,12 @@ use super::{Draft, PlacedPart};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::layout::routes::around::{End, Map};
 use crate::layout::spacing::turned;
-use crate::layout::{Component, Layers, Layout, LayoutOptions, Orientation, Plan, Route, pack};
+use crate::layout::{
+    Component, Layers, Layout, LayoutOptions, Orientation, PartTask, Plan, Route, pack,
+};
 
-/// The aspect, along by across, beyond which a part that does not fit the page is long.
+/// The aspect, along by across, beyond which a part that does not fit the page is long: in two rows, one of less is
+/// higher than it is wide.
 const LONG: f64 = 2.5;
 /// The most rows.
 const MOST_ROWS: usize = 12;
@@ -17,27 +20,23 @@ const MOST_ROWS: usize = 12;
 const MOST_CUT: usize = 8;
 /// The scale of a sketch divided by that of the drawing with all effort, at least: true of 165 of 169 synthetic parts.
 const SKETCHED: f64 = 0.9;
-/// The space beside an edge in a channel, and between a channel and the boxes.
+/// The space beside an edge in a channel, and between a channel and the boxes: the length of an arrow's head, and
+/// half as much again.
 const LANE: f64 = 8.0;
 const BESIDE: f64 = 12.0;
 
 /// Whether a placed part is so long that it does not fit the page.
-pub(crate) fn is_long(size: Size, options: &LayoutOptions, orientation: Orientation) -> bool {
-    let turned = turned(size, orientation);
-    turned.w > LONG * turned.h && pack::fit(size, options.page) < 1.0
+pub(crate) fn is_long(size: Size, task: PartTask<'_>) -> bool {
+    let turned = turned(size, task.orientation);
+    turned.w > LONG * turned.h && pack::fit(size, task.options.page) < 1.0
 }
 
 /// The part in rows, for each number of rows that fits the page better than the previous one; none if it
 /// cannot be cut between its namespaces, or is inside one namespace, whose contents can then be cut.
-pub(crate) fn wraps(
-    plan: &Plan,
-    options: &LayoutOptions,
-    part: &Component,
-    layers: &Layers,
-    orientation: Orientation,
-) -> Vec<PlacedPart> {
+pub(crate) fn wraps(task: PartTask<'_>, layers: &Layers) -> Vec<PlacedPart> {
+    let options = task.options;
     let mut found: Vec<PlacedPart> = Vec::new();
-    if part.root() != 0 {
+    if task.part.root() != 0 {
         return found;
     }
     let fit = |block: &PlacedPart| pack::fit(block.size, options.page);
@@ -47,12 +46,12 @@ pub(crate) fn wraps(
         ..*options
     };
     for many in 2..=MOST_ROWS {
-        let Some(cuts) = cuts(part, layers, many) else {
+        let Some(cuts) = cuts(task.part, layers, many) else {
             continue;
         };
         let placed = |options: &LayoutOptions| {
-            let rows = Wrapped::new(plan, options, part, layers, &cuts, orientation)?;
-            Some(rows.placed(plan, part)?.on_page(orientation))
+            let rows = Wrapped::new(PartTask { options, ..task }, layers, &cuts)?;
+            Some(rows.placed(task.plan, task.part)?.on_page(task.orientation))
         };
         let sketched = (useful > 0.0).then(|| placed(&sketch)).flatten();
         let useless = sketched.filter(|block| fit(block) < useful);
@@ -105,27 +104,21 @@ struct Wrapped {
 }
 
 impl Wrapped {
-    fn new(
-        plan: &Plan,
-        options: &LayoutOptions,
-        part: &Component,
-        layers: &Layers,
-        cuts: &[usize],
-        orientation: Orientation,
-    ) -> Option<Self> {
+    fn new(task: PartTask<'_>, layers: &Layers, cuts: &[usize]) -> Option<Self> {
+        let (part, orientation) = (task.part, task.orientation);
         let row_of = |v: usize| cuts.partition_point(|&cut| cut <= layers.rank[v]);
         let row: Vec<usize> = (0..part.vertices.len()).map(row_of).collect();
         // A row may be of any length, as it is not wrapped again.
         let endless = LayoutOptions {
             page: Size::new(1e5, 1e5),
-            ..*options
+            ..*task.options
         };
         let mut rows = Vec::new();
         let mut crossings = 0;
         for at in 0..=cuts.len() {
-            let sub = Subplan::new(plan, part, 0, |v| row[v] == at);
+            let sub = Subplan::new(task.plan, part, 0, |v| row[v] == at);
             let draft = Draft::new(&sub.plan, &endless)?;
-            let (crossed, layout) = draft.assembled(&sub.plan, &endless, orientation);
+            let (crossed, layout) = draft.assembled(orientation);
             crossings += crossed;
             rows.push((sub, lying(layout, orientation)));
         }

@@ -7,10 +7,11 @@ use std::collections::{BTreeMap, BinaryHeap};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::layout::{Outline, Plan, Route};
 
-/// The distance that an edge keeps from other boxes, and at which it turns around their corners.
+/// The distance that an edge keeps from other boxes, and at which it turns around their corners: outside that distance, so
+/// that it does not touch them in turning.
 const CLEAR: f64 = 3.0;
 const TURN: f64 = 5.0;
-/// The distance of edges between the same two boxes.
+/// The distance of edges between the same two boxes, that of ports.
 const PARALLEL: f64 = 6.0;
 /// The number of pairs of line and box that may be checked for all edges together; the remaining edges are
 /// straight.
@@ -55,7 +56,7 @@ const LANE: f64 = 10.0;
 const JOG: f64 = 16.0;
 /// The difference below which two positions across are the same, in pixels.
 const SAME: f64 = 0.05;
-/// The radius at which an edge with given points turns.
+/// The radius at which an edge with given points turns: an arrow's head, which needs a straight end.
 const BEND: f64 = 9.0;
 
 /// The end of a route: the index of a box, its rectangle and its outline.

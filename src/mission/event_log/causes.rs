@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 
 use super::drafts::{Drafts, LogInput};
 use super::{Detail, Event, EventId, Kind};
+use crate::base::ids::grouped;
 use crate::base::rhythm::{CLOSE_NS, CROWD_NS, FLAPS, SAME_STEP, TOGETHER_NS};
 use crate::base::time::Stamp;
-use crate::graph::{Element, NodeId, TopicId, Wiring};
+use crate::graph::{Element, NodeId, Wiring};
 
 /// Makes events with a known cause parts of it.
 pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
@@ -35,13 +36,8 @@ fn by<K: Ord>(
     ids: impl IntoIterator<Item = EventId>,
     key: impl Fn(&Event) -> Option<K>,
 ) -> BTreeMap<K, Vec<EventId>> {
-    let mut of: BTreeMap<K, Vec<EventId>> = BTreeMap::new();
-    for id in ids {
-        if let Some(key) = key(drafts.get(id)) {
-            of.entry(key).or_default().push(id);
-        }
-    }
-    of
+    let ids = ids.into_iter();
+    grouped(ids.filter_map(|id| Some((key(drafts.get(id))?, id))))
 }
 
 /// The node that an event is about, if that started, stopped or fell silent.
@@ -148,17 +144,14 @@ fn senders(context: &LogInput<'_>, wiring: &Wiring, what: Element) -> Vec<NodeId
 /// A silence that begins within an input's pause is a part of it, and so is a rate change that an input has too: `/detector` is
 /// silent while `/camera` is, and sends at half its rate when `/camera` does.
 fn follow_inputs(context: &LogInput<'_>, wiring: &Wiring, drafts: &mut Drafts) {
-    let mut pauses: BTreeMap<Element, Vec<EventId>> = BTreeMap::new();
-    let mut steps: BTreeMap<TopicId, Vec<EventId>> = BTreeMap::new();
-    for (id, event) in drafts.list.with_ids() {
-        match (event.kind, context.elements.ends(event.what).1) {
-            (Kind::Silent | Kind::Stopped | Kind::Restarted, _) => {
-                pauses.entry(event.what).or_default().push(id);
-            }
-            (Kind::Rate, Some(topic)) => steps.entry(topic).or_default().push(id),
-            _ => {}
-        }
-    }
+    let pauses = by(drafts, drafts.list.ids(), |event| {
+        let is_pause = matches!(event.kind, Kind::Silent | Kind::Stopped | Kind::Restarted);
+        is_pause.then_some(event.what)
+    });
+    let steps = by(drafts, drafts.list.ids(), |event| {
+        let topic = context.elements.ends(event.what).1;
+        topic.filter(|_| event.kind == Kind::Rate)
+    });
     for id in headlines(drafts, &[Kind::Silent, Kind::Rate]) {
         let event = drafts.get(id);
         let own = senders(context, wiring, event.what);
@@ -220,7 +213,7 @@ fn flaps(drafts: &mut Drafts) {
         }
         let until = drafts.get(*last).time;
         let event = &mut drafts.list[*first];
-        event.detail = Detail::Count(many as u64);
+        event.detail = Detail::Count { count: many as u64 };
         event.until = Some(until);
         for id in rest.iter().chain([last]) {
             drafts.fold(*id, *first);
@@ -277,6 +270,7 @@ fn is_within(a: Stamp, b: Stamp, within: i64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::graph::TopicId;
     use crate::graph::history::Bound;
 
     const SECOND: i64 = 1_000_000_000;

@@ -67,7 +67,7 @@ pub(crate) fn sorted(list: ById<EventId, Event>, elements: &Elements) -> SortedE
 pub(crate) type SortedEvents = (ById<EventId, Event>, ById<EventId, EventId>);
 
 /// As [`sorted`], with the order of events of one time and kind.
-pub(super) fn sorted_by<K: Ord>(
+pub(crate) fn sorted_by<K: Ord>(
     mut list: ById<EventId, Event>,
     key: impl Fn(&Event) -> K,
 ) -> SortedEvents {
@@ -94,7 +94,7 @@ pub(super) fn sorted_by<K: Ord>(
 
 impl Event {
     /// An event at a moment, with nothing else known about it.
-    pub(super) fn new(kind: Kind, what: Element, at: Bound) -> Self {
+    pub(in crate::mission) fn new(kind: Kind, what: Element, at: Bound) -> Self {
         Self {
             kind,
             what,

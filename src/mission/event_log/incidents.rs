@@ -25,7 +25,7 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
                 (Kind::Starved, Detail::Values { from, to })
             }
             IncidentKind::Duplicate => (Kind::Duplicate, Detail::None),
-            IncidentKind::Lost(many) => (Kind::Lost, Detail::Count(*many)),
+            IncidentKind::Lost(many) => (Kind::Lost, Detail::Count { count: *many }),
             IncidentKind::Switch(from, to) => {
                 let [from, to] = [from, to].map(|topic| publishers(context, *topic));
                 if from.is_empty() || to.is_empty() || from == to {

@@ -50,7 +50,7 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EventId], event: &Event) -> 
             };
             format!("handed over: {} → {}{by}", names(from), names(to))
         }
-        (Detail::Count(many), kind) => {
+        (Detail::Count { count: many }, kind) => {
             let over = lasted.map_or_else(String::new, |lasted| format!(" in {lasted}"));
             let times = words::count(*many, "time");
             match kind {

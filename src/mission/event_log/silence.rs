@@ -6,7 +6,8 @@
 use std::collections::BTreeMap;
 
 use super::drafts::{Drafts, LogInput};
-use super::{EventId, Kind};
+use super::{Event, EventId, Kind};
+use crate::base::ids::grouped;
 use crate::base::rhythm::TOGETHER_NS;
 use crate::base::time::Stamp;
 use crate::graph::history::{Bound, Sender, Silence};
@@ -43,15 +44,13 @@ struct Gone(BTreeMap<NodeId, Vec<(Stamp, EventId)>>);
 
 impl Gone {
     fn new(drafts: &Drafts) -> Self {
-        let mut gone: BTreeMap<NodeId, Vec<(Stamp, EventId)>> = BTreeMap::new();
-        for (id, event) in drafts.list.with_ids() {
-            let whole = event.part_of.unwrap_or(id);
-            if let (Element::Node(node), Kind::Stopped | Kind::Restarted) = (event.what, event.kind)
-            {
-                gone.entry(node).or_default().push((event.time, whole));
+        let end = |(id, event): (EventId, &Event)| match (event.what, event.kind) {
+            (Element::Node(node), Kind::Stopped | Kind::Restarted) => {
+                Some((node, (event.time, event.part_of.unwrap_or(id))))
             }
-        }
-        Self(gone)
+            _ => None,
+        };
+        Self(grouped(drafts.list.with_ids().filter_map(end)))
     }
 
     /// The event about the end of one of these senders at that time.
@@ -68,13 +67,8 @@ fn by<'a, I: Ord>(
     context: &LogInput<'a>,
     key: impl Fn(&Sender) -> Option<I>,
 ) -> BTreeMap<I, Vec<&'a Sender>> {
-    let mut of: BTreeMap<I, Vec<&Sender>> = BTreeMap::new();
-    for sender in &context.history.sending.senders {
-        if let Some(key) = key(sender) {
-            of.entry(key).or_default().push(sender);
-        }
-    }
-    of
+    let senders = context.history.sending.senders.iter();
+    grouped(senders.filter_map(|sender| Some((key(sender)?, sender))))
 }
 
 /// The silences of an element.

@@ -389,7 +389,7 @@ fn cells(mission: &Mission, id: EventId, event: &Event) -> Vec<String> {
     let (before, after) = match &event.detail {
         Detail::None => (String::new(), String::new()),
         Detail::Rates { from_hz, to_hz } => (from_hz.to_string(), to_hz.to_string()),
-        Detail::Count(many) => (String::new(), many.to_string()),
+        Detail::Count { count: many } => (String::new(), many.to_string()),
         Detail::Senders { from, to } => (names(from), names(to)),
         Detail::Values { from, to } => (shown(Some(from)), shown(Some(to))),
     };

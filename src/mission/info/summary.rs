@@ -2,10 +2,10 @@
 //! mission begin with it.
 
 use std::cmp::Reverse;
-use std::collections::BTreeMap;
 
 use super::{Info, TopicInfo};
 use crate::base::cast;
+use crate::base::ids::grouped;
 use crate::base::name::{last_part, namespace};
 use crate::base::rhythm::CLOSE_NS;
 use crate::base::words::{self, visible};
@@ -106,12 +106,9 @@ pub(crate) struct Most {
 
 /// Some changes in words, the kinds with most elements first: `planner, controller and 5 more of /robot1 stopped, /plan appeared`.
 pub(crate) fn described(mission: &Mission, headlines: &[Headline<'_>], most: Most) -> String {
-    let mut kinds: BTreeMap<(bool, Kind), Vec<Headline<'_>>> = BTreeMap::new();
-    for headline in headlines {
-        let is_edge = matches!(headline.1.what, Element::Publish(_) | Element::Subscribe(_));
-        let kind = (is_edge, headline.1.kind);
-        kinds.entry(kind).or_default().push(*headline);
-    }
+    let is_edge = |what| matches!(what, Element::Publish(_) | Element::Subscribe(_));
+    let kind = |(_, event): &Headline<'_>| (is_edge(event.what), event.kind);
+    let kinds = grouped(headlines.iter().map(|one| (kind(one), *one)));
     let mut kinds: Vec<_> = kinds.into_iter().collect();
     kinds.sort_by_key(|(_, own)| Reverse(weight(own)));
     let words = kinds.iter().take(most.kinds).map(|((is_edge, kind), own)| {

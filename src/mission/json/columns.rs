@@ -87,14 +87,15 @@ impl<'a> JsonColumns<'a> {
         let mut lifecycles = lifecycles.into_iter();
         let mut states = self.state.values(|word| State::from_word(word));
         let mut degrees = self.degree.values(|word| Confidence::from_word(word));
-        let mut sent = self.sent.values(|count| *count);
-        let mut counts = self.count.values(|count| *count);
-        let mut bytes = self.bytes.values(|bytes| *bytes);
-        let mut medians = self.median_period_s.values(|value| Number::of(*value));
-        let mut gaps = self.max_gap_s.values(|value| Number::of(*value));
-        let mut drops = self.drops.values(|count| *count);
-        let mut jitters = self.jitter_s.values(|value| Number::of(*value));
-        let mut ages = self.age_s.values(|value| Number::of(*value));
+        let (mut sent, mut counts) = (self.sent.plain(), self.count.plain());
+        let (mut bytes, mut drops) = (self.bytes.plain(), self.drops.plain());
+        let [mut medians, mut gaps, mut jitters, mut ages] = [
+            &self.median_period_s,
+            &self.max_gap_s,
+            &self.jitter_s,
+            &self.age_s,
+        ]
+        .map(|column| column.values(|value| Number::of(*value)));
         let mut rates = self.hz.values(JsonRate::number);
         let mut next = 0;
         for (from, to) in &self.windows {
@@ -123,14 +124,8 @@ impl<'a> JsonColumns<'a> {
 // Run-length encoded columns.
 
 /// Values, each with the number of its repetitions.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 struct JsonColumn<T>(Vec<(T, u32)>);
-
-impl<T> Default for JsonColumn<T> {
-    fn default() -> Self {
-        Self(Vec::new())
-    }
-}
 
 impl<T: PartialEq> JsonColumn<T> {
     fn push(&mut self, value: T) {
@@ -156,6 +151,12 @@ impl<T> JsonColumn<T> {
     ) -> impl Iterator<Item = U> + 'a {
         let values = self.0.iter();
         values.flat_map(move |(value, times)| std::iter::repeat_n(meaning(value), *times as usize))
+    }
+}
+
+impl<T: Copy> JsonColumn<T> {
+    fn plain(&self) -> impl Iterator<Item = T> {
+        self.values(|value| *value)
     }
 }
 

@@ -5,11 +5,10 @@ use serde::{Deserialize, Serialize};
 use super::{Text, text};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Confidence, Evidence};
-use crate::graph::diff::Change;
 use crate::graph::{ById, Element, Elements, NodeId};
+use crate::mission::Change;
 use crate::mission::event_log::{
-    Detail, Event, EventId, EventLog, Interruption, InterruptionKind, Kind, Phase, described,
-    sorted,
+    Detail, Event, EventId, EventLog, Interruption, InterruptionKind, Kind, Phase, sorted,
 };
 
 /// An element by its name, or an edge by its two names.
@@ -66,7 +65,7 @@ pub(crate) struct EventJson<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     until_ns: Option<Stamp>,
     #[serde(flatten)]
-    detail: DetailJson<'a>,
+    detail: Option<DetailJson<'a>>,
     degree: Option<Text<'a>>,
     #[serde(default)]
     evidence: Evidence,
@@ -80,73 +79,13 @@ pub(crate) struct EventJson<'a> {
     weight: Option<u32>,
 }
 
-#[derive(Deserialize, Serialize)]
-#[serde(untagged)]
-pub(crate) enum DetailJson<'a> {
-    Rates {
-        from_hz: f64,
-        to_hz: f64,
-    },
-    Count {
-        count: u64,
-    },
-    Senders {
-        from: Vec<Text<'a>>,
-        to: Vec<Text<'a>>,
-    },
-    Values {
-        from: Text<'a>,
-        to: Text<'a>,
-    },
-    None {},
-}
+/// The values of an event with the names of nodes; `None` if there are none.
+type DetailJson<'a> = Detail<Text<'a>, Text<'a>>;
 
-impl<'a> DetailJson<'a> {
-    pub(crate) fn new(detail: &Detail, elements: &'a Elements) -> Self {
-        let names = |nodes: &[NodeId]| {
-            let name = |id: &NodeId| elements.nodes[*id].name.as_str().into();
-            nodes.iter().map(name).collect()
-        };
-        match detail {
-            Detail::None => Self::None {},
-            Detail::Rates { from_hz, to_hz } => Self::Rates {
-                from_hz: *from_hz,
-                to_hz: *to_hz,
-            },
-            Detail::Senders { from, to } => Self::Senders {
-                from: names(from),
-                to: names(to),
-            },
-            Detail::Count(count) => Self::Count { count: *count },
-            Detail::Values { from, to } => Self::Values {
-                from: from.to_string().into(),
-                to: to.to_string().into(),
-            },
-        }
-    }
-
-    fn detail(&self, elements: &Elements) -> Option<Detail> {
-        let nodes = |names: &[Text<'_>]| {
-            let all = names.iter().map(|name| elements.node(name));
-            all.collect::<Option<Vec<_>>>()
-        };
-        Some(match self {
-            Self::None {} => Detail::None,
-            Self::Rates { from_hz, to_hz } => Detail::Rates {
-                from_hz: *from_hz,
-                to_hz: *to_hz,
-            },
-            Self::Senders { from, to } => Detail::Senders {
-                from: nodes(from)?,
-                to: nodes(to)?,
-            },
-            Self::Count { count } => Detail::Count(*count),
-            Self::Values { from, to } => Detail::Values {
-                from: (&**from).into(),
-                to: (&**to).into(),
-            },
-        })
-    }
+fn detail_json<'a>(detail: &'a Detail, elements: &'a Elements) -> Option<DetailJson<'a>> {
+    let name = |id: &NodeId| Some(elements.nodes[*id].name.as_str().into());
+    let detail = detail.mapped(name, |text| Text::from(&**text));
+    detail.filter(|detail| *detail != Detail::None)
 }
 
 /// The events of a log, in order.
@@ -167,7 +106,7 @@ pub(crate) fn events<'a>(
         earliest_ns: Some(event.earliest),
         latest_ns: Some(event.latest),
         until_ns: event.until,
-        detail: DetailJson::new(&event.detail, elements),
+        detail: detail_json(&event.detail, elements),
         degree: Some(event.confidence.word().into()),
         evidence: event.evidence,
         parts: parts.get(&id).cloned().unwrap_or_default(),
@@ -209,7 +148,12 @@ impl EventJson<'_> {
             earliest: self.earliest_ns.unwrap_or(self.time_ns),
             latest: self.latest_ns.unwrap_or(self.time_ns),
             until: self.until_ns,
-            detail: self.detail.detail(elements)?,
+            detail: match &self.detail {
+                Some(detail) => {
+                    detail.mapped(|name| elements.node(name), |text| (&**text).into())?
+                }
+                None => Detail::None,
+            },
             confidence: (self.degree.as_deref())
                 .and_then(Confidence::from_word)
                 .unwrap_or(Confidence::Stated),
@@ -317,20 +261,18 @@ enum ChangeValues<'a> {
     Time {
         time_ns: Option<Stamp>,
     },
-    Other(DetailJson<'a>),
+    Detail(DetailJson<'a>),
 }
 
 impl<'a> ChangeRow<'a> {
-    pub(crate) fn new(change: &Change, event: EventId, elements: &'a Elements) -> Self {
-        let (_, what, time_ns, detail) = described(change);
+    pub(crate) fn new(change: &'a Change, event: EventId, elements: &'a Elements) -> Self {
+        let time_ns = change.time;
+        let detail = detail_json(&change.detail, elements);
         Self {
             kind: change.word(),
             event,
-            named: ElementName::new(what, elements),
-            values: match &detail {
-                Detail::None => ChangeValues::Time { time_ns },
-                detail => ChangeValues::Other(DetailJson::new(detail, elements)),
-            },
+            named: ElementName::new(change.what, elements),
+            values: detail.map_or(ChangeValues::Time { time_ns }, ChangeValues::Detail),
         }
     }
 }

@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use crate::base::ids::grouped;
 use crate::base::name::is_quiet;
 use crate::base::time::{Span, Stamp};
 use crate::graph::history::{Sending, Stretch, silences};
-use crate::graph::{Edge, Element, Elements, NodeId, TopicId};
+use crate::graph::{Edge, Element, Elements, Existence, NodeId, TopicId};
 
 /// The longest absence, as a part of the mission (one in so many), that is ignored inside an element's lifetime: a slow
 /// topic has no message in some cells, of which there are at most 200. With a twentieth, a node that is away for a whole phase would be
@@ -161,14 +162,9 @@ fn subjects(
 
 /// Whether at least half of the messages are on topics with a known publisher.
 pub(crate) fn knows_publishers(elements: &Elements, sending: &Sending) -> bool {
-    let mut known_on: BTreeMap<TopicId, Vec<&Edge>> = BTreeMap::new();
-    for edge in elements
-        .publishes
-        .iter()
-        .filter(|e| !e.seen.evidence.is_guess())
-    {
-        known_on.entry(edge.topic).or_default().push(edge);
-    }
+    let edges = elements.publishes.iter();
+    let sure = edges.filter(|edge| !edge.seen.evidence.is_guess());
+    let known_on = grouped(sure.map(|edge| (edge.topic, edge)));
     let (mut all, mut known) = (0_u64, 0_u64);
     for sender in &sending.senders {
         let topic = elements.topics.get(sender.topic);
@@ -193,19 +189,14 @@ pub(crate) type Ends = Vec<(Option<Stamp>, Option<Stamp>)>;
 
 /// The exact first and last signs by role, or by topic.
 pub(crate) fn ends(elements: &Elements, topics: bool) -> BTreeMap<&str, Ends> {
-    let mut ends: BTreeMap<&str, Ends> = BTreeMap::new();
+    let ends = |seen: &Existence| (seen.first, seen.last);
+    let of_nodes = elements.nodes.iter();
+    let of_topics = elements.topics.iter();
     if topics {
-        for topic in &elements.topics {
-            let of = ends.entry(topic.name.as_str()).or_default();
-            of.push((topic.seen.first, topic.seen.last));
-        }
+        grouped(of_topics.map(|topic| (topic.name.as_str(), ends(&topic.seen))))
     } else {
-        for node in &elements.nodes {
-            let of = ends.entry(&*node.role).or_default();
-            of.push((node.seen.first, node.seen.last));
-        }
+        grouped(of_nodes.map(|node| (&*node.role, ends(&node.seen))))
     }
-    ends
 }
 
 #[cfg(test)]

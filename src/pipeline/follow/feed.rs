@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use super::SoFar;
 use crate::base::error::Result;
+use crate::base::ids::grouped;
 use crate::base::rhythm::{CLOSING_NS, SWITCH_NS, TOGETHER_NS};
 use crate::base::time::Stamp;
 use crate::base::words::worded;
@@ -89,10 +90,8 @@ impl Feed {
         let mission = &known.mission;
         // Elements that begin with the kept messages existed before.
         let from = known.from.plus(TOGETHER_NS);
-        let mut places: BTreeMap<&Key, Vec<usize>> = BTreeMap::new();
-        for (place, printed) in self.printed.iter().enumerate() {
-            places.entry(&printed.key).or_default().push(place);
-        }
+        let printed = self.printed.iter().enumerate();
+        let mut places = grouped(printed.map(|(place, printed)| (&printed.key, place)));
         let mut found = Vec::new();
         for row in headlines(mission, format) {
             let Some((key, time, certainty)) = identity(mission, &row, known.now) else {

@@ -1,15 +1,14 @@
 //! Counts the messages of a recording per publisher, topic and window, by its index alone.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::bag::{self, Input, OpenOptions, Want};
 use crate::base::error::Result;
+use crate::base::ids::grouped;
 use crate::base::notice::Notices;
 use crate::base::role::role;
 use crate::base::table::{Batch, ColumnKind, ColumnOf, TableCell, columns};
 use crate::base::time::{Period, Stamp};
-use crate::evidence::times::SeriesId;
 use crate::graph::window::Align;
 use crate::pipeline::Unwatched;
 use crate::pipeline::inputs::each_once;
@@ -163,10 +162,7 @@ const COLUMNS: &[ColumnOf<CountTable, Count>] = columns! {
 
 /// The counts of all senders.
 fn counts(times: &MessageTimes<'_>, windows: Windows) -> Result<Vec<Count>> {
-    let mut senders: BTreeMap<&Sender, Vec<SeriesId>> = BTreeMap::new();
-    for (sender, series) in times.senders.iter().zip(&times.series) {
-        senders.entry(sender).or_default().push(*series);
-    }
+    let senders = grouped(times.senders.iter().zip(times.series.iter().copied()));
     let mut all: Vec<Count> = Vec::new();
     for (sender, series) in senders {
         let sender = Arc::new(sender.clone());

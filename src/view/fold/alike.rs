@@ -3,10 +3,10 @@
 //!
 //! `/robot1/planner`, `/robot1/costmap` and `/robot1/controller` run while robot 1 navigates: one box with three names.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::{Fold, ItemKey, Keys, of};
+use crate::base::ids::grouped;
 use crate::base::name::namespace;
 use crate::base::time::Span;
 use crate::graph::{Element, Elements};
@@ -15,20 +15,16 @@ use crate::view::ItemKind;
 
 /// The nodes that move to the box of the first of those that are alike in these phases.
 pub(crate) fn folds(elements: &Elements, phases: &[Span], keys: &Keys) -> Vec<Fold> {
-    let mut alike: BTreeMap<(&str, Vec<bool>), Vec<Element>> = BTreeMap::new();
-    for id in elements.nodes.ids() {
-        let what = Element::Node(id);
-        // Nodes outside of all namespaces have nothing else in common.
-        let is_inside = |key: &&ItemKey| key.kind == ItemKind::Node && namespace(&key.name) != "/";
-        if let Some(key) = of(keys, what).filter(is_inside) {
-            let lives = &elements.seen(what).lives;
-            let there = phases.iter().map(|phase| fill(lives, *phase)).collect();
-            alike
-                .entry((namespace(&key.name), there))
-                .or_default()
-                .push(what);
-        }
-    }
+    // Nodes outside of all namespaces have nothing else in common.
+    let is_inside = |key: &&ItemKey| key.kind == ItemKind::Node && namespace(&key.name) != "/";
+    let alike = |what| {
+        let key = of(keys, what).filter(is_inside)?;
+        let lives = &elements.seen(what).lives;
+        let there: Vec<bool> = phases.iter().map(|phase| fill(lives, *phase)).collect();
+        Some(((namespace(&key.name), there), what))
+    };
+    let nodes = elements.nodes.ids().map(Element::Node);
+    let alike = grouped(nodes.filter_map(alike));
     let folds = alike.into_values().flat_map(|nodes| {
         let first = nodes.first().and_then(|what| of(keys, *what)).cloned();
         let fold = move |what| {

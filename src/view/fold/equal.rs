@@ -10,6 +10,7 @@ use std::hash::{Hash, Hasher as _};
 use std::sync::Arc;
 
 use super::{Fold, ItemKey, Keys};
+use crate::base::ids::grouped;
 use crate::base::name::{is_within, namespace};
 use crate::graph::{Element, Elements};
 use crate::view::ViewOptions;
@@ -64,12 +65,8 @@ impl Fleets {
     pub(crate) fn new(elements: &Elements, options: &ViewOptions) -> Self {
         let kept = options.expand.iter().chain(&options.collapse);
         let kept: BTreeSet<&str> = kept.map(|k| k.trim_end_matches('/')).collect();
-        let mut spaces = Spaces::new();
-        for (name, element) in names(elements) {
-            if let Some(space) = space_of(name) {
-                spaces.entry(space).or_default().push((name, element));
-            }
-        }
+        let spaces: Spaces<'_> =
+            grouped(names(elements).filter_map(|of| Some((space_of(of.0)?, of))));
         let mut alike: BTreeMap<&str, BTreeMap<Inside, Vec<&str>>> = BTreeMap::new();
         for (space, inside) in described(elements) {
             if !kept.contains(space) {

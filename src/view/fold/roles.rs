@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::{Fold, ItemKey};
+use crate::base::ids::grouped;
 use crate::base::time::Stamp;
 use crate::evidence::Evidence;
 use crate::graph::{Element, Elements, Node, NodeId};
@@ -15,10 +16,9 @@ use crate::view::{Item, ItemKind};
 
 /// The runs of each role whose nodes existed one after the other.
 pub(crate) fn folds(elements: &Elements) -> Vec<Fold> {
-    let mut by_role: BTreeMap<&Arc<str>, Vec<(NodeId, &Node)>> = BTreeMap::new();
-    for (id, node) in elements.nodes.with_ids().filter(|(_, n)| is_anonymous(n)) {
-        by_role.entry(&node.role).or_default().push((id, node));
-    }
+    let nodes = elements.nodes.with_ids();
+    let anonymous = nodes.filter(|(_, node)| is_anonymous(node));
+    let mut by_role = grouped(anonymous.map(|(id, node)| (&node.role, (id, node))));
     by_role.retain(|role, runs| runs.len() > 1 && follow(runs) && !is_taken(elements, role));
     let folds = by_role.into_iter().flat_map(|(role, runs)| {
         runs.into_iter().map(|(id, _)| Fold {

@@ -4,18 +4,19 @@
 //! `/battery`, which only `/driver` publishes and nobody reads, is the row `→ /battery` of `/driver`; `/tf` is a row of each
 //! of the six nodes that use it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use crate::base::ids::grouped;
 use crate::base::name::{is_unnamed, namespace};
 use crate::graph::ById;
 use crate::mission::EventId;
 use crate::view::choose::is_infrastructure;
-use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemId, Looks, Shown, TopicRow, View};
+use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemId, Shown, ShownRuns, TopicRow, View};
 
 /// A topic that is a row in a box: one without another known endpoint, or a hub.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CardRow {
+pub struct BoxRow {
     /// The box that it is a row of.
     pub owner: ItemId,
     /// Whether that box publishes it, and whether it subscribes to it.
@@ -25,7 +26,7 @@ pub struct CardRow {
     /// The topic, or the group of topics.
     pub item: Item,
     /// The looks of the topic, window by window.
-    pub shown: Looks,
+    pub shown: ShownRuns,
 }
 
 /// The least number of boxes that a hub is connected to, and of outermost namespaces (or the outside) that
@@ -48,11 +49,8 @@ impl View {
         let mut items_stay = ById::like(&self.items, true);
         let mut arrows_stay = ById::like(&self.arrows, true);
         for (topic, lines) in lines.with_ids().filter(|(_, lines)| !lines.is_empty()) {
-            let mut owners: BTreeMap<ItemId, Vec<ArrowId>> = BTreeMap::new();
-            for at in lines {
-                let end = self.topic_end(&self.arrows[*at]).map(|(_, owner)| owner);
-                owners.entry(end.unwrap_or(topic)).or_default().push(*at);
-            }
+            let owner = |at: ArrowId| self.topic_end(&self.arrows[at]).map_or(topic, |end| end.1);
+            let owners = grouped(lines.iter().map(|at| (owner(*at), *at)));
             let is_infrastructure = hides_infrastructure
                 && is_infrastructure(&self.items[topic].name)
                 || self.is_hub(owners.keys());
@@ -79,7 +77,7 @@ impl View {
             row.owner = places[row.owner];
         }
         rows.sort_by(|a, b| {
-            let key = |row: &CardRow| {
+            let key = |row: &BoxRow| {
                 (
                     row.owner,
                     [!row.ways[0], !row.ways[1]],
@@ -125,13 +123,13 @@ impl View {
         };
         let all = self.looks_of(lines).chain([looks]);
         let mut windows = all
-            .flat_map(Looks::runs)
+            .flat_map(ShownRuns::runs)
             .map(|run| run.0 as usize)
             .filter(needs_line);
         windows.all(|k| reported(self.looks_of(lines).filter_map(|line| line.at(k))).is_some())
     }
 
-    fn looks_of<'a>(&'a self, lines: &'a [ArrowId]) -> impl Iterator<Item = &'a Looks> + Clone {
+    fn looks_of<'a>(&'a self, lines: &'a [ArrowId]) -> impl Iterator<Item = &'a ShownRuns> + Clone {
         lines.iter().filter_map(|at| self.arrows_shown.get(*at))
     }
 
@@ -141,7 +139,7 @@ impl View {
         (topic, owner): (ItemId, ItemId),
         lines: &[ArrowId],
         is_infrastructure: bool,
-    ) -> CardRow {
+    ) -> BoxRow {
         let sends = |at: &ArrowId| self.arrows[*at].to == topic;
         let receives = |at: &ArrowId| self.arrows[*at].from == topic;
         let own = self.items_shown.get(topic);
@@ -157,18 +155,18 @@ impl View {
                 ..(if is_infrastructure { line } else { look }).clone()
             })
         };
-        CardRow {
+        BoxRow {
             owner,
             ways: [lines.iter().any(sends), lines.iter().any(receives)],
             is_infrastructure,
             item: self.items[topic].clone(),
-            shown: Looks::made_of(self.looks_of(lines).chain(own), row),
+            shown: ShownRuns::made_of(self.looks_of(lines).chain(own), row),
         }
     }
 
     /// Hides a box of unnamed publishers in windows without any of its topics, apart from hubs, as it would
     /// be empty. Returns the boxes that are never shown.
-    fn hide_unnamed(&mut self, rows: &[CardRow]) -> Vec<ItemId> {
+    fn hide_unnamed(&mut self, rows: &[BoxRow]) -> Vec<ItemId> {
         let mut never = Vec::new();
         for (at, looks) in self.items.ids().zip(self.items_shown.iter_mut()) {
             let is_linked = |arrow: &Arrow| arrow.from == at || arrow.to == at;
@@ -176,9 +174,9 @@ impl View {
             if !is_unnamed || self.arrows.iter().any(is_linked) {
                 continue;
             }
-            let is_own = |row: &&CardRow| row.owner == at && !row.is_infrastructure;
+            let is_own = |row: &&BoxRow| row.owner == at && !row.is_infrastructure;
             let own = rows.iter().filter(is_own).map(|row| &row.shown);
-            *looks = Looks::made_of(own.clone().chain([&*looks]), |k| {
+            *looks = ShownRuns::made_of(own.clone().chain([&*looks]), |k| {
                 let is_there = own.clone().any(|shown| shown.at(k).is_some());
                 looks.at(k).filter(|_| is_there).cloned()
             });
@@ -253,15 +251,15 @@ impl View {
 }
 
 /// Sets the ids of these looks to their indices.
-fn renumber(all: &mut [Looks]) {
+fn renumber(all: &mut [ShownRuns]) {
     for (looks, id) in all.iter_mut().zip(0..) {
         looks.renumber(id);
     }
 }
 
 /// The looks of one line for both ways between a node and a topic.
-fn both_ways(ways: [&Looks; 2]) -> Looks {
-    Looks::made_of(ways.into_iter(), |k| {
+fn both_ways(ways: [&ShownRuns; 2]) -> ShownRuns {
+    ShownRuns::made_of(ways.into_iter(), |k| {
         let looks = ways.map(|way| way.at(k));
         let look = reported(looks.into_iter().flatten())?;
         Some(Shown {
@@ -304,7 +302,7 @@ mod tests {
         };
         let (view, _) = view(&mission(windows), &options);
         let name = |item: &Item| item.name.to_string();
-        let row = |row: &CardRow| {
+        let row = |row: &BoxRow| {
             let sign = match row.ways {
                 [true, true] => "↔",
                 [true, false] => "→",

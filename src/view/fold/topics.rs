@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::{Fold, ItemKey, Keys, names};
+use crate::base::ids::grouped;
 use crate::base::name::namespace;
 use crate::graph::{ById, Element, Elements, TopicId};
 use crate::view::choose::is_tf;
@@ -48,12 +49,8 @@ fn take<'a>(
     at_least: usize,
     group: impl Fn(&Free<'a>, &'a str) -> Option<String>,
 ) {
-    let mut found: BTreeMap<String, Vec<&'a str>> = BTreeMap::new();
-    for name in free.keys().copied() {
-        if let Some(group) = group(free, name) {
-            found.entry(group).or_default().push(name);
-        }
-    }
+    let names = free.keys().copied();
+    let found = grouped(names.filter_map(|name| Some((group(free, name)?, name))));
     for (group, names) in found.into_iter().filter(|f| f.1.len() >= at_least) {
         let members = groups.entry(group).or_default();
         members.extend(names.iter().filter_map(|name| free.remove(name)));

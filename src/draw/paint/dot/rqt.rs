@@ -16,7 +16,7 @@ use crate::view::{Arrow, ArrowKind, Item, ItemId, ItemKind, Mark, SeenWindow, Sh
 
 /// The length of an arrow's head in points, as Graphviz draws it.
 const HEAD: f64 = 10.0;
-/// The distance from a cluster's corner to its title.
+/// The distance from a cluster's corner to its title, Graphviz's margin of clusters.
 const MARGIN: f64 = 8.0;
 const POINTS_PER_INCH: f64 = 72.0;
 

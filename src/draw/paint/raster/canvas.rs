@@ -10,7 +10,7 @@ use crate::base::cast;
 use crate::base::error::Result;
 use crate::draw::scene::{Group, Scene};
 
-/// The largest share of changed tiles; above it, everything is redrawn.
+/// The largest share of changed tiles; above it, everything is redrawn, since clipping then costs more than it saves.
 const MOST_SHARE: f64 = 0.7;
 
 /// A scene with its pixels.

@@ -8,7 +8,7 @@ use crate::draw::scene::{Form, Group, Piece, Shape, Step, Text};
 use crate::draw::style::Color;
 use crate::draw::text::Fonts;
 
-/// The side of a tile in pixels of the page.
+/// The side of a tile in pixels of the page: about the height of a box.
 pub(super) const SIDE: f64 = 32.0;
 
 /// A set of tiles of one page.
