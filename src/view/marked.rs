@@ -38,6 +38,8 @@ pub(crate) struct WindowMarks {
     pub(crate) ongoing: Vec<OngoingEvent>,
     pub(crate) items: BTreeMap<ItemId, Changed>,
     pub(crate) arrows: BTreeMap<ArrowId, Changed>,
+    /// The parts of the headlines.
+    parts: Parts,
 }
 
 impl WindowMarks {
@@ -79,8 +81,14 @@ impl WindowMarks {
                     changed.report(viewed, part, id, Part::Whole);
                 }
             }
+            changed.parts.extend(parts.map(|parts| (id, parts.clone())));
         }
         changed
+    }
+
+    /// The parts of a headline.
+    fn parts_of(&self, headline: EventId) -> impl Iterator<Item = EventId> {
+        self.parts.get(&headline).into_iter().flatten().copied()
     }
 
     fn report(&mut self, viewed: &Viewed<'_>, event: &Event, headline: EventId, part: Part) {
@@ -286,6 +294,10 @@ impl WindowChanges {
             return;
         }
         let id = ArrowId(shown.id);
+        // The number on a line is that of the event, also of one that is a consequence.
+        let own = shown.events.iter();
+        let own = own.flat_map(|id| [*id].into_iter().chain(self.marks.parts_of(*id)));
+        let events: Vec<&Event> = own.filter_map(|id| now.event(id)).collect();
         for row in &mut shown.topics {
             let has = |items: &LivingItems| items.has_topic(now.viewed, id, row.topic);
             let there = (has(&self.before), has(&self.after));
@@ -294,7 +306,7 @@ impl WindowChanges {
                 (true, false) => row.mark = Some(Mark::Removed),
                 _ => {
                     let name = &arrow.topics[row.topic as usize];
-                    for event in shown.events.iter().filter_map(|id| now.event(*id)) {
+                    for event in &events {
                         let topic = now.viewed.elements.ends(event.what).1;
                         if topic.is_some_and(|topic| now.viewed.bundled[topic] == *name) {
                             (row.mark, row.rates) = changed(event);
