@@ -350,7 +350,7 @@ impl<'a> Picture<'a> {
                 .flatten();
             let now = view.place_in_time(frame.index);
             let member_list = member_list
-                .map(|who| pen.member_list(space, (*place, self.shifts[at]), &id, (now, who)));
+                .map(|who| pen.member_list(space, *place, self.shifts[at], &id, now, who));
             let empty = (!full[at]).then(|| {
                 if self.measured.graph.first_seen[at] > frame.index {
                     "not on yet"
@@ -368,7 +368,7 @@ impl<'a> Picture<'a> {
                 Some(at) => self.layout.clusters.get(at),
                 None => self.layout.boxes.get(view.items.len()),
             };
-            titles.extend(place.and_then(|place| pen.footer(footer, also, *place, (view, k))));
+            titles.extend(place.and_then(|place| pen.footer(footer, also, *place, view, k)));
         }
         let [lines, labels] = self.lines(seen);
         let items = seen.items.iter().filter_map(|shown| {
@@ -387,7 +387,7 @@ impl<'a> Picture<'a> {
             }
             groups.push(drawn);
             if let Some(rows) = &card.card {
-                groups.extend(pen.card_rows((rows, &card.id), card.place, (view, k)));
+                groups.extend(pen.card_rows(rows, &card.id, card.place, view, k));
             }
         }
     }
@@ -420,7 +420,7 @@ fn places(
     let (shifts, titles) = room::place_titles(&titles, &cards, &tracks, fit.scale)
         .into_iter()
         .unzip();
-    room::place_badges(&mut cards, &mut tracks, titles, (radius, fit.scale));
+    room::place_badges(&mut cards, &mut tracks, titles, radius, fit.scale);
     (cards, tracks, shifts)
 }
 

@@ -82,7 +82,7 @@ fn contents(info: &Info) -> String {
         (info.nodes_by_degree.total(), "node"),
         (topics.len(), "topic"),
     ];
-    let counts = words::counted(&counts, |n, what| words::count(n, what));
+    let counts = words::counted(&counts, words::count);
     let rate = match topics[..] {
         [one] => one.hz.map(|hz| format!(" at {}", words::rate(hz))),
         _ => None,

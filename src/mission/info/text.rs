@@ -106,7 +106,7 @@ fn known(out: &mut String, info: &Info) -> std::fmt::Result {
             (row.publishes, "publication"),
             (row.subscribes, "subscription"),
         ];
-        let parts = words::counted(&parts, |n, what| words::count(n, what));
+        let parts = words::counted(&parts, words::count);
         writeln!(out, "  {:<18} {parts}", row.source)?;
     }
     info.advice
