@@ -24,7 +24,7 @@ use crate::base::geometry::Rect;
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::graph::history::Sending;
-use crate::graph::{ById, Element, Elements, Graph, Graphs, NodeId, TopicId};
+use crate::graph::{ById, Element, Elements, Graph, Graphs, TopicId};
 
 pub(crate) use event_log::EventId;
 pub use event_log::EventLog;
@@ -142,17 +142,11 @@ impl Mission {
     }
 
     /// Determines the changes from each window to the next, and derives lifetimes, sending and log from them: for
-    /// missions with known windows only. A rate must change by more than the fraction `threshold`;
-    /// `restarts` are nodes that restarted under the same name, sorted by time.
-    pub fn find_changes(&mut self, threshold: f64, restarts: &[(NodeId, Stamp)]) {
+    /// missions with known windows only. A rate must change by more than the fraction `threshold`, ≥ 0.
+    pub fn find_changes(&mut self, threshold: f64) {
         let mut finder = changes::Changes::new(&self.elements, threshold);
         for (window, graph) in self.windows.iter_mut().zip(&self.graphs) {
-            let inside: Vec<_> = restarts
-                .iter()
-                .copied()
-                .filter(|(_, at)| window.span.contains(*at))
-                .collect();
-            window.changes = finder.next(window.span, &graph, &inside);
+            window.changes = finder.next(window.span, &graph);
         }
         let all = self.elements.all();
         for (what, seen) in all.zip(self.elements.seen_mut()) {
@@ -162,10 +156,10 @@ impl Mission {
             seen.lives = lives;
         }
         self.sending = Sending::of_windows(&self.elements, &self.graphs);
-        self.log = changes::from_changes(&self.elements, &self.windows);
-        let places = changes::places(&self.log, &self.windows);
-        for (window, places) in self.windows.iter_mut().zip(places) {
-            window.events = places;
+        let (log, events) = changes::logged(&self.elements, &self.windows);
+        self.log = log;
+        for (window, events) in self.windows.iter_mut().zip(events) {
+            window.events = events;
         }
     }
 

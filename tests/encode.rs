@@ -10,7 +10,7 @@ use bagreel::internals::base::geometry::{Rect, Size};
 use bagreel::internals::base::time::{Span, Stamp};
 use bagreel::internals::draw::paint::raster::Painter;
 use bagreel::internals::draw::scene::{Form, Group, Scene, Shape};
-use bagreel::internals::draw::style::Style;
+use bagreel::internals::draw::style::{Color, Style};
 use bagreel::internals::draw::text::Fonts;
 use bagreel::internals::export::run;
 use bagreel::internals::export::sequence::{Drawings, Sequence, SequenceOptions};
@@ -26,13 +26,16 @@ struct Discs;
 impl Drawings for Discs {
     fn scene(&self, window: usize) -> Scene {
         let style = Style::builtin("light").unwrap();
+        let shade = |at: usize| u8::try_from(at * 40 % 256).unwrap();
+        let colors: [Color; 20] =
+            std::array::from_fn(|at| Color::of([shade(at), shade(at / 6), 90]));
         let mut group = Group::named("discs");
-        for (i, color) in style.palette().iter().enumerate() {
+        for (i, color) in colors.iter().enumerate() {
             let place = Rect::new(12.0 * i as f64, 30.0, 40.0, 30.5);
             group.shape(Shape::filled(Form::Ellipse(place), *color));
         }
         let x = 20.0 * (window as f64 + 1.0);
-        let color = style.palette()[window % style.palette().len()];
+        let color = colors[window % colors.len()];
         group.shape(Shape::filled(
             Form::Ellipse(Rect::new(x, 5.0, 22.0, 17.0)),
             color,

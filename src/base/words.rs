@@ -177,6 +177,13 @@ pub fn count(n: impl TryInto<usize>, word: &str) -> String {
     }
 }
 
+/// The counts that are not 0, as `write` writes each: `2 nodes, 1 topic`.
+pub(crate) fn counted(counts: &[(usize, &str)], write: impl Fn(usize, &str) -> String) -> String {
+    let counts = counts.iter().filter(|(n, _)| *n > 0);
+    let counts = counts.map(|(n, word)| write(*n, word));
+    counts.collect::<Vec<_>>().join(", ")
+}
+
 /// A share as a whole percentage without its sign: `25` for 0.25.
 pub fn percent(share: f64) -> String {
     format!("{:.0}", share * 100.0)

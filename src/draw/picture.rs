@@ -359,7 +359,7 @@ impl<'a> Picture<'a> {
                 .flatten();
             let now = view.place_in_time(frame.index);
             let member_list = member_list
-                .map(|who| pen.member_list(space, (*place, self.shifts[at]), &id, (now, who)));
+                .map(|who| pen.member_list(space, *place, self.shifts[at], &id, now, who));
             let empty = (!full[at]).then(|| {
                 if self.measured.graph.first_seen[at] > frame.index {
                     "not on yet"
@@ -377,7 +377,7 @@ impl<'a> Picture<'a> {
                 Some(at) => self.layout.clusters.get(at),
                 None => self.layout.boxes.get(view.items.len()),
             };
-            let words = place.and_then(|place| pen.footer(footer, also, *place, (view, k)));
+            let words = place.and_then(|place| pen.footer(footer, also, *place, view, k));
             let is_news = words.as_ref().is_some_and(also::is_news);
             titles.extend(if is_news { words } else { words.map(pale) });
         }
@@ -397,7 +397,7 @@ impl<'a> Picture<'a> {
                 pen.presence(&mut drawn, presence, card, item.kind);
             }
             let rows = card.card.iter();
-            let rows = rows.flat_map(|rows| pen.card_rows((rows, &card.id), card.place, (view, k)));
+            let rows = rows.flat_map(|rows| pen.card_rows(rows, &card.id, card.place, view, k));
             let all = std::iter::once(drawn).chain(rows);
             if spotlight
                 .as_ref()
@@ -438,7 +438,7 @@ fn places(
     let (shifts, titles) = room::place_titles(&titles, &cards, &tracks, fit.scale)
         .into_iter()
         .unzip();
-    room::place_badges(&mut cards, &mut tracks, titles, (radius, fit.scale));
+    room::place_badges(&mut cards, &mut tracks, titles, radius, fit.scale);
     (cards, tracks, shifts)
 }
 

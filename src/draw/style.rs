@@ -3,7 +3,6 @@
 
 mod color;
 
-use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde::Deserialize;
@@ -83,8 +82,6 @@ pub struct Style {
     pub(crate) changed: Change,
     pub(crate) badge: Badge,
     pub(crate) count: CountBadge,
-    #[serde(skip)]
-    palette: Vec<Color>,
 }
 
 impl Style {
@@ -144,27 +141,8 @@ impl Style {
     }
 
     fn from_keys(keys: Table, path: &Path) -> Result<Self> {
-        let mut palette = BTreeSet::new();
-        for value in keys
-            .values()
-            .filter_map(Value::as_table)
-            .flat_map(Table::values)
-        {
-            palette.extend(
-                value
-                    .as_str()
-                    .and_then(Color::parse)
-                    .filter(|c| *c != Color::NONE),
-            );
-        }
-        let mut style: Self = keys
-            .try_into()
-            .map_err(|e: toml::de::Error| Error::bad_file(path, 0, e.message(), HINT))?;
-        let (background, part) = (style.background(), 1.0 - style.page.spotlight);
-        let pale: Vec<Color> = palette.iter().map(|c| c.faded(background, part)).collect();
-        palette.extend(pale);
-        style.palette = palette.into_iter().collect();
-        Ok(style)
+        let bad = |e: toml::de::Error| Error::bad_file(path, 0, e.message(), HINT);
+        keys.try_into().map_err(bad)
     }
 
     /// The style for paper, where space is scarce: names of [`PRINTED_NAMES`] pixels before they are scaled to their size
@@ -186,11 +164,6 @@ impl Style {
         self.badge.radius *= PRINTED_BADGE;
         self.badge.glow *= PRINTED_BADGE;
         self
-    }
-
-    /// Every colour of the style, once, sorted.
-    pub fn palette(&self) -> &[Color] {
-        &self.palette
     }
 
     /// The colour behind everything.
@@ -336,8 +309,7 @@ mod tests {
     #[test]
     fn every_builtin_style_is_complete() {
         for (name, _) in BUILTIN {
-            let style = Style::builtin(name).unwrap();
-            assert!(style.palette().len() >= 2, "{name}");
+            assert!(Style::builtin(name).is_ok(), "{name}");
         }
         assert_ne!(
             Style::builtin("light").unwrap(),
@@ -359,7 +331,6 @@ mod tests {
         assert_eq!(mine.added.color.to_string(), "#0000FF");
         assert!((mine.added.width - 4.0).abs() < 1e-9);
         assert_eq!(mine.removed, dark.removed);
-        assert!(mine.palette().contains(&mine.added.color));
     }
 
     #[test]

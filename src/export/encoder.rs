@@ -29,8 +29,6 @@ pub enum Needs {
 /// A frame, shared by all encoders of its size, on the core that drew it.
 #[derive(Clone, Copy)]
 pub struct DrawnFrame<'a> {
-    /// The window it shows, and the time for which it is shown.
-    pub time: FrameTime,
     /// The drawing.
     pub scene: &'a Scene,
     /// The drawing as pixels; empty unless an encoder needs them.
@@ -339,9 +337,7 @@ pub(crate) mod testing {
             title: String::new(),
             groups: Vec::new(),
         };
-        let frame_time = FrameTime { window: 0, ms: 100 };
         pack(&DrawnFrame {
-            time: frame_time,
             scene: &scene,
             pixels: &pixels,
             palette,

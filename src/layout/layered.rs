@@ -128,7 +128,7 @@ impl<'a> Draft<'a> {
             };
             (part, best_block(task, orderings))
         });
-        assembled(plan, options, blocks.collect(), orientation)
+        assembled(plan, options, &blocks.collect::<Vec<_>>(), orientation)
     }
 }
 
@@ -509,7 +509,7 @@ impl PlacedPart {
 pub(crate) fn assembled(
     plan: &Plan,
     options: &LayoutOptions,
-    blocks: Vec<(&Component, PlacedPart)>,
+    blocks: &[(&Component, PlacedPart)],
     orientation: Orientation,
 ) -> (u64, Layout) {
     let task = |part| PartTask {

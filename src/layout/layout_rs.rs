@@ -96,7 +96,7 @@ fn lay_out(plan: &Plan, options: &LayoutOptions, orientation: Orientation) -> Re
             "use `--layout layered`",
         )
     })?;
-    let (_, mut layout) = assembled(&flat, options, blocks, orientation);
+    let (_, mut layout) = assembled(&flat, options, &blocks, orientation);
     layout.clusters = vec![Rect::default(); plan.clusters.len()];
     labels::place(&flat, &mut layout);
     if !plan.clusters.is_empty() {

@@ -9,12 +9,11 @@ use std::sync::Arc;
 
 use super::Window;
 use super::event_log::{Detail, Event, EventId, EventLog, Kind, sorted_by};
-use crate::base::ids::grouped;
 use crate::base::time::{Span, Stamp};
 use crate::graph::diff::{Diff, diff};
 use crate::graph::history::Bound;
 use crate::graph::{
-    ById, Edge, Element, ElementState, Elements, Graph, Graphs, Id as _, NodeId, State, TopicId,
+    ById, Element, ElementState, Elements, Graph, Graphs, Id as _, NodeId, State, TopicId,
 };
 
 /// A change from one window to the next: that of the event to which it belongs, as far as the window shows it.
@@ -231,31 +230,11 @@ fn change(event: &Event) -> Option<Change> {
     (is_change && !event.kind.is_remark()).then_some(change)
 }
 
-/// The ids of the events that explain the windows' changes, in a log that was made from them: for each change, the
-/// nearest in time with the same kind and element.
-pub(crate) fn places(log: &EventLog, windows: &[Window]) -> Vec<Vec<EventId>> {
-    let events = log.events.with_ids();
-    let of = grouped(events.map(|(id, event)| ((event.kind, event.what), id)));
-    let time = |id: EventId| log.events[id].time;
-    let place = |change: &Change, start: Stamp| {
-        let all = of.get(&(change.kind, change.what))?;
-        let next = all.partition_point(|id| time(*id) < start);
-        let near = all[next.saturating_sub(1)..].iter().take(2).copied();
-        near.min_by_key(|id| time(*id).since(start).abs())
-    };
-    let of_window = |window: &Window| {
-        let changes = window.changes.iter();
-        changes
-            .map(|c| place(c, window.span.start).unwrap_or_default())
-            .collect()
-    };
-    windows.iter().map(of_window).collect()
-}
-
 // The log of a mission with known windows only: each change belongs to its window.
 
-/// The log from the changes between windows. A change without a time inside its window is put at the window's start.
-pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> EventLog {
+/// The log from the changes between windows, and the event of each of a window's changes. A change without a time inside its
+/// window is put at the window's start.
+pub(crate) fn logged(elements: &Elements, windows: &[Window]) -> (EventLog, Vec<Vec<EventId>>) {
     let mut events = ById::default();
     for window in windows {
         let offset = events.len();
@@ -271,10 +250,16 @@ pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> EventLog 
             });
         }
     }
-    EventLog {
-        events: sorted_by(events, |event| event.what).0,
+    let (events, ids) = sorted_by(events, |event| event.what);
+    let mut ids = ids.into_iter();
+    let of_windows = windows.iter().map(|window| window.changes.len());
+    let of_windows = of_windows.map(|many| ids.by_ref().take(many).collect());
+    let of_windows = of_windows.collect();
+    let log = EventLog {
+        events,
         ..EventLog::default()
-    }
+    };
+    (log, of_windows)
 }
 
 /// The outermost event that explains this one: parts have no parts.
@@ -293,7 +278,6 @@ struct WindowChanges<'a> {
     /// The elements that appeared, with the indices of their changes; `went` has those that vanished.
     came: BTreeMap<Element, usize>,
     went: BTreeMap<Element, usize>,
-    restarted: BTreeMap<NodeId, usize>,
     handed: BTreeMap<TopicId, usize>,
     /// The publications that appeared or vanished, per topic.
     senders: BTreeMap<TopicId, Vec<(Element, NodeId)>>,
@@ -306,7 +290,6 @@ impl<'a> WindowChanges<'a> {
             window,
             came: BTreeMap::new(),
             went: BTreeMap::new(),
-            restarted: BTreeMap::new(),
             handed: BTreeMap::new(),
             senders: BTreeMap::new(),
         };
@@ -315,7 +298,6 @@ impl<'a> WindowChanges<'a> {
             match (change.kind, what) {
                 _ if change.is_added() => owners.came.insert(what, at),
                 _ if change.is_removed() => owners.went.insert(what, at),
-                (Kind::Restarted, Element::Node(node)) => owners.restarted.insert(node, at),
                 (Kind::HandedOver, Element::Topic(topic)) => owners.handed.insert(topic, at),
                 _ => None,
             };
@@ -370,8 +352,7 @@ impl<'a> WindowChanges<'a> {
             Element::Publish(_) | Element::Subscribe(_) => {
                 let (node, topic) = self.edge(what)?;
                 let cause = moved.get(&Element::Node(node));
-                let cause = cause.or_else(|| self.handed.get(&topic));
-                let cause = cause.or_else(|| self.restarted.get(&node)).copied();
+                let cause = cause.or_else(|| self.handed.get(&topic)).copied();
                 let is_subscribed = matches!(what, Element::Subscribe(_));
                 let has_moved = is_subscribed && moved.contains_key(&Element::Topic(topic));
                 cause.or_else(|| has_moved.then(|| self.topic_mover(topic, moved)).flatten())
@@ -396,19 +377,13 @@ impl<'a> WindowChanges<'a> {
         nodes.copied().next()
     }
 
-    /// The index of the change that explains a rate change: a publisher that started, stopped or restarted, or other
-    /// publishers.
+    /// The index of the change that explains a rate change: other publishers, or one that started or stopped.
     fn sender(&self, what: Element) -> Option<usize> {
         let topic = match what {
             Element::Topic(topic) => topic,
             _ => self.edge(what)?.1,
         };
-        let again = |edge: &Edge| {
-            let restarted = self.restarted.get(&edge.node);
-            restarted.filter(|_| edge.topic == topic)
-        };
-        let other = self.handed.get(&topic);
-        if let Some(at) = other.or_else(|| self.elements.publishes.iter().find_map(again)) {
+        if let Some(at) = self.handed.get(&topic) {
             return Some(*at);
         }
         let (edge, node) = self.senders.get(&topic)?.first()?;
@@ -450,16 +425,10 @@ impl<'a> Changes<'a> {
         }
     }
 
-    /// The changes from the previous window to this one; none in the first, which is the base. `restarts` are
-    /// nodes that restarted in it under the same name, and when.
+    /// The changes from the previous window to this one; none in the first, which is the base.
     ///
-    /// Order: added, removed, rates, hand-overs, restarts, values; each by kind of element and name.
-    pub(crate) fn next(
-        &mut self,
-        span: Span,
-        graph: &Graph,
-        restarts: &[(NodeId, Stamp)],
-    ) -> Vec<Change> {
+    /// Order: added, removed, rates, hand-overs, values; each by kind of element and name.
+    pub(crate) fn next(&mut self, span: Span, graph: &Graph) -> Vec<Change> {
         let mut changes = Vec::new();
         if let Some((old_span, old)) = self.before.take() {
             let diff = diff(&old, graph);
@@ -474,10 +443,6 @@ impl<'a> Changes<'a> {
             }));
             self.rates(&diff, graph, (old_span, span), &mut changes);
             self.handed_over(&old, graph, &mut changes);
-            let again = |(node, time): &(NodeId, Stamp)| {
-                Change::new(Kind::Restarted, Element::Node(*node), Some(*time))
-            };
-            changes.extend(restarts.iter().map(again));
             lifecycles(&diff, &mut changes);
         } else {
             self.handed_over(graph, graph, &mut Vec::new());

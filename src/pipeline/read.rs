@@ -232,7 +232,7 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
         return Err(Error::bad_file(path, 0, reason, hint));
     }
     if !mission.knows_lives() {
-        mission.find_changes(reading.rate_change, &[]);
+        mission.find_changes(reading.rate_change);
     } else if (reading.rate_change - RATE_CHANGE).abs() > f64::EPSILON {
         let what = format!(
             "`--rate-change` has no effect on `{}`, which already contains its changes",

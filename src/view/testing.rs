@@ -48,7 +48,7 @@ pub(crate) fn mission(windows: &[&str]) -> Mission {
         layout: None,
         notices: Notices::new(),
     };
-    mission.find_changes(0.25, &[]);
+    mission.find_changes(0.25);
     mission
 }
 

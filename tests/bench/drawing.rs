@@ -33,7 +33,7 @@ fn main() {
     let frames: usize = words.next().map_or(3600, |n| n.parse().unwrap());
     let path = Path::new(&mission);
     let mut mission = mission::read_json(&std::fs::read_to_string(path).unwrap(), path).unwrap();
-    mission.find_changes(0.25, &[]);
+    mission.find_changes(0.25);
     let (view, _) = view(&mission, &ViewOptions::default());
     let (style, fonts) = (Style::builtin("light").unwrap(), Fonts::bundled());
     let measured = Measured::new(&view, &style, &fonts, PageOptions::default());

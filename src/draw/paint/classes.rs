@@ -94,27 +94,22 @@ impl Classes<'_> {
         for piece in &group.pieces {
             let Piece::Text(text) = piece else { continue };
             seen += 1;
-            let place = (whole(text.at.x), whole(text.at.y));
-            if let Some((part, look)) = element.filter(|(part, _)| part.is_live && seen == texts) {
-                // Some are shown only in windows in which the rate changed.
-                let class = if part.shows_changes { "r c" } else { "r" };
-                xml.open("text").attribute("class", class);
-                let (x, y) = place;
-                xml.attribute("x", x)
-                    .attribute("y", y)
-                    .text(look.text)
-                    .close();
-                continue;
-            }
             let name = element.and_then(|(part, _)| part.name.as_ref());
-            let name = name.filter(|_| seen == 1);
+            let (class, words) = match element {
+                // Some are shown only in windows in which the rate changed.
+                Some((part, look)) if part.is_live && seen == texts => {
+                    (if part.shows_changes { "r c" } else { "r" }, look.text)
+                }
+                _ if seen > 1 => ("m", &*text.text),
+                _ => ("", &**name.unwrap_or(&text.text)),
+            };
             xml.open("text");
-            if seen > 1 {
-                xml.attribute("class", "m");
+            if !class.is_empty() {
+                xml.attribute("class", class);
             }
-            xml.attribute("x", place.0)
-                .attribute("y", place.1)
-                .text(name.unwrap_or(&text.text))
+            xml.attribute("x", whole(text.at.x))
+                .attribute("y", whole(text.at.y))
+                .text(words)
                 .close();
         }
     }

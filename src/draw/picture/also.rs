@@ -156,7 +156,8 @@ impl GraphPen<'_> {
         footer: &Footer,
         also: &AlsoHere,
         place: Rect,
-        (view, k): (&View, usize),
+        view: &View,
+        k: usize,
     ) -> Option<Group> {
         let (style, scale) = (&self.style.edge, self.fit.scale);
         let inset = if footer.cluster.is_some() { INSET } else { 0.0 };

@@ -246,10 +246,10 @@ impl GraphPen<'_> {
             _ => Tip::Arrow,
         };
         if arrow.kind == ArrowKind::Bundle {
-            self.line(&mut group, track, &look, (tip, topics::uses(shown)));
+            self.line(&mut group, track, &look, tip, topics::uses(shown));
             self.rows(&mut over, track, shown, &look);
         } else {
-            self.line(&mut group, track, &look, (tip, [true, false]));
+            self.line(&mut group, track, &look, tip, [true, false]);
         }
         if let Some((text, is_badge)) = arrow_label(arrow, shown, ends[0])
             && track.label.is_some()
@@ -276,7 +276,8 @@ impl GraphPen<'_> {
         group: &mut Group,
         track: &ArrowPath,
         look: &ArrowLook,
-        (kind, heads): (Tip, [bool; 2]),
+        kind: Tip,
+        heads: [bool; 2],
     ) {
         let Some(first) = track.curves.first() else {
             return;

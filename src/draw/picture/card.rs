@@ -200,9 +200,11 @@ impl GraphPen<'_> {
     /// The rows of a card with its outline at `place` that exist in window `k`; `owner` is the id of its group.
     pub(crate) fn card_rows(
         &self,
-        (card, owner): (&Card, &str),
+        card: &Card,
+        owner: &str,
         place: Rect,
-        (view, k): (&View, usize),
+        view: &View,
+        k: usize,
     ) -> Vec<Group> {
         let size = self.style.topic.size * self.fit.scale;
         let top = place.y + card.head * self.fit.scale + size * 0.2;
@@ -210,17 +212,12 @@ impl GraphPen<'_> {
         let row = |(line, at): (&Line, u32)| {
             let y = top + size * STEP * f64::from(at);
             let place = Rect::new(place.x, y, place.w, size * STEP);
-            self.row(line, owner, (place, view, k))
+            self.row(line, owner, place, view, k)
         };
         lines.filter_map(row).collect()
     }
 
-    fn row(
-        &self,
-        line: &Line,
-        owner: &str,
-        (place, view, k): (Rect, &View, usize),
-    ) -> Option<Group> {
+    fn row(&self, line: &Line, owner: &str, place: Rect, view: &View, k: usize) -> Option<Group> {
         let seen = line.topics.iter().filter_map(|(at, _)| {
             let row = &view.rows[*at];
             Some((row, view.seen_at(&row.shown, k)?))

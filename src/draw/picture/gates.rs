@@ -201,7 +201,9 @@ impl Gate {
 /// Gives the labels of merged lines the same space: for a gate, on its leading line; for a fork, on all of
 /// its lines.
 pub(crate) fn share(
-    (view, fonts, style): (&View, &Fonts, &Edge),
+    view: &View,
+    fonts: &Fonts,
+    style: &Edge,
     rooms: &mut ById<ArrowId, Option<Size>>,
     gates: &[(Gate, Vec<String>)],
     forks: &ById<ArrowId, Option<usize>>,

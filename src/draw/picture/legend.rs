@@ -207,11 +207,11 @@ fn draw(group: &mut Group, sign: &LegendSign, style: &Style, place: Rect, unit: 
         }
         LegendSign::Line(confidence) => {
             let stroke = arrow_of(ArrowKind::Subscribe, *confidence, None);
-            arrow(group, place, stroke, (Tip::Arrow, style.edge.arrow * unit));
+            arrow(group, place, stroke, Tip::Arrow, style.edge.arrow * unit);
         }
         LegendSign::Starved => {
             let stroke = arrow_of(ArrowKind::Subscribe, Confidence::Stated, None);
-            arrow(group, place, stroke, (Tip::Stop, style.edge.arrow * unit));
+            arrow(group, place, stroke, Tip::Stop, style.edge.arrow * unit);
         }
         LegendSign::Width => widths(group, style, place, unit),
     }
@@ -266,7 +266,7 @@ fn across(place: Rect) -> Form {
     line(Point::new(place.x, y), Point::new(place.right(), y))
 }
 
-fn arrow(group: &mut Group, place: Rect, stroke: Stroke, (kind, head): (Tip, f64)) {
+fn arrow(group: &mut Group, place: Rect, stroke: Stroke, kind: Tip, head: f64) {
     let color = stroke.color;
     let shorter = Rect::new(place.x, place.y, place.w - head * 0.7, place.h);
     group.shape(Shape::line(across(shorter), stroke));

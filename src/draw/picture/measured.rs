@@ -96,7 +96,7 @@ impl MeasuredGraph {
         };
         let gates: Vec<_> = gates::gates(view).into_iter().map(named).collect();
         let forks = gates::forks(view, &gates);
-        gates::share((view, fonts, &style.edge), &mut rooms, &gates, &forks);
+        gates::share(view, fonts, &style.edge, &mut rooms, &gates, &forks);
         let through: BTreeSet<ArrowId> = gates.iter().flat_map(|(gate, _)| gate.lines()).collect();
         let links = view.arrows.with_ids().zip(&rooms).zip(&forks);
         let links = links.map(|(((id, arrow), room), fork)| Link {

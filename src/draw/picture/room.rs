@@ -79,7 +79,8 @@ pub(super) fn place_badges(
     cards: &mut [ItemBox],
     tracks: &mut [ArrowPath],
     titles: Vec<Rect>,
-    (radius, scale): (f64, f64),
+    radius: f64,
+    scale: f64,
 ) {
     for card in cards.iter_mut() {
         card.badge = corners(card.place, scale)[0];
@@ -199,9 +200,9 @@ mod tests {
     fn a_badge_avoids_a_corner_with_a_line() {
         let mut cards = [card(Rect::new(0.0, 0.0, 100.0, 40.0))];
         let along = |x: f64| line(Point::new(x, -50.0), Point::new(x, 90.0));
-        place_badges(&mut cards, &mut [along(130.0)], Vec::new(), (8.0, 1.0));
+        place_badges(&mut cards, &mut [along(130.0)], Vec::new(), 8.0, 1.0);
         assert_eq!(cards[0].badge, Point::new(96.0, 1.0));
-        place_badges(&mut cards, &mut [along(97.0)], Vec::new(), (8.0, 1.0));
+        place_badges(&mut cards, &mut [along(97.0)], Vec::new(), 8.0, 1.0);
         assert_eq!(cards[0].badge, Point::new(4.0, 1.0));
     }
 
@@ -246,7 +247,7 @@ mod tests {
             line(Point::new(0.0, 0.0), Point::new(200.0, 0.0)),
             line(Point::new(100.0, -30.0), Point::new(100.0, 90.0)),
         ];
-        place_badges(&mut [], &mut both, Vec::new(), (8.0, 1.0));
+        place_badges(&mut [], &mut both, Vec::new(), 8.0, 1.0);
         assert!((both[0].badge.x - 100.0).abs() > 8.0, "{:?}", both[0].badge);
     }
 }

@@ -151,9 +151,11 @@ impl GraphPen<'_> {
     pub(crate) fn member_list(
         &self,
         space: &Space,
-        (place, by): (Rect, Point),
+        place: Rect,
+        by: Point,
         id: &str,
-        (now, who): (f64, &[MemberState]),
+        now: f64,
+        who: &[MemberState],
     ) -> Group {
         let size = self.style.cluster.size;
         let (place, scale) = (self.fit.rect(place).moved(by), self.fit.scale);

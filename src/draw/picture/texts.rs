@@ -1,6 +1,6 @@
 //! The words on the picture: badges with counts, labels of boxes and arrows, and facts about an element.
 
-use crate::base::words::{count, rate, rate_change, rate_of, rates};
+use crate::base::words::{count, counted, rate, rate_change, rate_of, rates};
 use crate::draw::style::Body;
 use crate::graph::{ById, State};
 use crate::view::{Arrow, ArrowKind, Counts, Item, ItemKind, Shown, View};
@@ -35,20 +35,16 @@ fn change_count(sign: char, numbers: [usize; 3]) -> String {
 /// The words for changes other than beginnings and ends: `1 handed over, 2 restarted`.
 fn changed(counts: &Counts) -> String {
     let parts = [
-        (
-            counts.handed_over,
-            format!("{} handed over", counts.handed_over),
-        ),
-        (counts.restarted, format!("{} restarted", counts.restarted)),
-        (counts.silent, format!("{} fell silent", counts.silent)),
-        (counts.values, count(counts.values, "state")),
-        (counts.rates, count(counts.rates, "rate")),
+        (counts.handed_over, "handed over"),
+        (counts.restarted, "restarted"),
+        (counts.silent, "fell silent"),
+        (counts.values, "state"),
+        (counts.rates, "rate"),
     ];
-    let reported = parts.into_iter().filter(|(n, _)| *n > 0);
-    reported
-        .map(|(_, words)| words)
-        .collect::<Vec<_>>()
-        .join(", ")
+    counted(&parts, |n, what| match what {
+        "state" | "rate" => count(n, what),
+        _ => format!("{n} {what}"),
+    })
 }
 
 /// The words for changes inside a collapsed namespace: `+1 −4 nodes, 1 restarted`.

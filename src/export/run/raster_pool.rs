@@ -241,7 +241,6 @@ impl<'a> Drawer<'a> {
         }
         self.at = Some(at);
         let frame = DrawnFrame {
-            time: frame_time,
             scene,
             pixels,
             palette: &self.pool.palette,

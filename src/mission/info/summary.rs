@@ -82,9 +82,7 @@ fn contents(info: &Info) -> String {
         (info.nodes_by_degree.total(), "node"),
         (topics.len(), "topic"),
     ];
-    let counts = counts.iter().filter(|(many, _)| *many > 0);
-    let counts = counts.map(|(many, word)| words::count(*many, word));
-    let counts = counts.collect::<Vec<String>>().join(", ");
+    let counts = words::counted(&counts, words::count);
     let rate = match topics[..] {
         [one] => one.hz.map(|hz| format!(" at {}", words::rate(hz))),
         _ => None,

@@ -106,12 +106,8 @@ fn known(out: &mut String, info: &Info) -> std::fmt::Result {
             (row.publishes, "publication"),
             (row.subscribes, "subscription"),
         ];
-        let parts: Vec<String> = parts
-            .iter()
-            .filter(|(n, _)| *n > 0)
-            .map(|(n, what)| words::count(*n, what))
-            .collect();
-        writeln!(out, "  {:<18} {}", row.source, parts.join(", "))?;
+        let parts = words::counted(&parts, words::count);
+        writeln!(out, "  {:<18} {parts}", row.source)?;
     }
     info.advice
         .iter()
@@ -134,17 +130,13 @@ pub(crate) fn how_many(what: &str, confidences: ConfidenceCounts) -> String {
         (confidences.inferred, "inferred"),
         (confidences.declared, "declared"),
     ];
-    let parts: Vec<String> = parts
-        .iter()
-        .filter(|(n, _)| *n > 0)
-        .map(|(n, word)| format!("{n} {word}"))
-        .collect();
-    let inner = if parts.is_empty() {
-        String::new()
+    let parts = words::counted(&parts, |n, word| format!("{n} {word}"));
+    let all = words::count(confidences.total(), what);
+    if parts.is_empty() {
+        all
     } else {
-        format!(" ({})", parts.join(", "))
-    };
-    words::count(confidences.total(), what) + &inner
+        format!("{all} ({parts})")
+    }
 }
 
 const fn column(head: &'static str, is_right: bool, least: usize, gives: (u8, u8)) -> Column {

@@ -341,10 +341,10 @@ mod tests {
     #[test]
     fn json_round_trips() {
         let mut mission = read(SMALL).unwrap();
-        mission.find_changes(0.25, &[]);
+        mission.find_changes(0.25);
         let first = written(&mission);
         let mut again = read(&first).unwrap();
-        again.find_changes(0.25, &[]);
+        again.find_changes(0.25);
         assert_eq!(first, written(&again));
     }
 
