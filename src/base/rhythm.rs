@@ -60,6 +60,15 @@ pub(crate) const PAUSE_FEWEST: u64 = 3;
 pub(crate) const PAUSE_MOST: f64 = 5.0;
 pub(crate) const PAUSE_MOST_SHARE: f64 = 0.01;
 
+/// The part of a recording over which the speed of a simulation is measured, since clocks tick once a second or more often;
+/// and the shortest time for which a speed lasts: with less, each hesitation of a simulator would be one.
+pub(crate) const SPEED_NS: i64 = 2 * SECOND;
+pub(crate) const SPEED_HOLDS_NS: i64 = 10 * SECOND;
+/// The percentage of the topics with a steady rate that change it by one factor at once if the clock that is not recorded does;
+/// and the fewest such topics, and named nodes that send them: a camera with its drivers has as many topics, in one or two nodes.
+pub(crate) const SPEED_SHARE: usize = 80;
+pub(crate) const SPEED_FEWEST: (usize, usize) = (5, 3);
+
 // ---- Starts and restarts.
 
 /// The largest number of a log record that shows a start: the first record of a process.

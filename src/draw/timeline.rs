@@ -30,6 +30,8 @@ pub struct Timeline {
     pub(crate) span: Span,
     /// The phases; none if there is only one.
     pub(crate) phases: Vec<PhaseLabel>,
+    /// The times at which nothing was recorded, or simulated time was set back or stood still.
+    pub(crate) interruptions: Vec<Span>,
     /// The rows.
     pub(crate) rows: Vec<Row>,
 }
@@ -40,6 +42,7 @@ impl Timeline {
         Self {
             span: source.span(),
             phases: phases::numbered(source),
+            interruptions: source.mission.log.holes().collect(),
             rows,
         }
     }

@@ -31,6 +31,12 @@ impl Number {
         })
     }
 
+    /// The stamp as a time.
+    pub(crate) fn time(self) -> Stamp {
+        let [seconds, nanos] = [self.stamp, self.stamp >> 32].map(|part| part & 0xffff_ffff);
+        Stamp((seconds * 1_000_000_000 + nanos).cast_signed())
+    }
+
     /// Whether it is so small, after `before`, that its publisher may just have started.
     pub(crate) fn begins_after(self, before: Self) -> bool {
         self.number <= BEGUN_AGAIN && self.number < before.number

@@ -3,7 +3,7 @@
 //!
 //! In: everything recorded, and the findings. Out: a [`History`], made once, from which windows, events, phases and figures
 //! are derived; nothing here depends on windows. Begin with `records`, which calls the others in order: `senders` reads the
-//! times of every topic, `restarts` and `pauses` find restarts and the pauses of `recordings` in them, `liveness` collects the signs
+//! times of every topic, `restarts`, `pauses` and `simulation` find restarts and the pauses of `recordings` and simulators in them, `liveness` collects the signs
 //! of each element, `lifetimes` decides when it existed.
 
 mod lifetimes;
@@ -13,6 +13,7 @@ mod recordings;
 pub(crate) mod records;
 mod restarts;
 pub(crate) mod senders;
+pub(crate) mod simulation;
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

@@ -29,7 +29,7 @@ use crate::graph::{ById, Element, NodeId};
 
 pub(crate) use changes::{described, explain, from_changes, places};
 pub(crate) use drafts::{LogInput, sorted};
-pub(crate) use sentence::{predicate, sentence, sentence_with};
+pub(crate) use sentence::{interrupted, predicate, sentence, sentence_with};
 pub use written::{LogFormat, LogLine, LogOptions, log};
 pub(crate) use written::{LogRow, body, headlines, lines, quoted, row_lines, whole};
 
@@ -214,8 +214,10 @@ pub struct Interruption {
     pub time: Stamp,
     /// The kind.
     pub kind: InterruptionKind,
-    /// The time by which the clock went back, or for which nothing was recorded, in nanoseconds, ≥ 0.
+    /// The time by which the clock went back, or for which it lasted, in nanoseconds, ≥ 0.
     pub length: i64,
+    /// The speed of a simulation in percent of the recorder's clock; 100 in all other kinds.
+    pub percent: u32,
 }
 
 worded! {
@@ -228,6 +230,12 @@ worded! {
         ClockBack = "clock_back",
         /// Nothing was recorded: the recorder paused, or its clock was set ahead.
         Nothing = "nothing_recorded",
+        /// Simulated time was set back, according to `/clock`.
+        SimulationBack = "simulation_back",
+        /// Simulated time stood still.
+        SimulationPaused = "simulation_paused",
+        /// Simulated time had another speed than the recorder's clock, or than at the beginning.
+        SimulationSpeed = "simulation_speed",
     }
 }
 
@@ -320,6 +328,18 @@ impl EventLog {
             }
         }
         found
+    }
+
+    /// The times of interruptions, which have no length where a clock went back; without those in which the simulation goes on.
+    pub(crate) fn holes(&self) -> impl Iterator<Item = Span> + '_ {
+        let all = self.interruptions.iter();
+        all.filter_map(|one| match one.kind {
+            InterruptionKind::ClockBack | InterruptionKind::SimulationBack => {
+                Some(Span::new(one.time, one.time))
+            }
+            InterruptionKind::SimulationSpeed => None,
+            _ => Some(Span::new(one.time, one.time.plus(one.length))),
+        })
     }
 
     /// The ids of the parts of all events, in order, by the ids of those events.

@@ -12,7 +12,7 @@ use crate::base::time::Stamp;
 use crate::base::words;
 use crate::graph::{Element, Elements, NodeId, TopicId, Wiring};
 use crate::mission::Mission;
-use crate::mission::event_log::{Detail, EventId, EventLog, Kind, Parts};
+use crate::mission::event_log::{Detail, EventId, EventLog, Kind, Parts, interrupted};
 
 /// The largest length of a name in characters; longer ones would fill a headline alone.
 const LONGEST_NAME: usize = 48;
@@ -90,7 +90,18 @@ impl<'a> CaptionWriter<'a> {
         for lasting in &frame.lasting {
             self.lasting(lasting).add(&mut groups, lasting.event);
         }
-        frame.caption = groups.into_values().map(plural).collect();
+        let (log, span) = (self.log, frame.span);
+        let during = log
+            .interruptions
+            .iter()
+            .filter(|one| span.contains(one.time));
+        let during = during.map(|one| Phrase {
+            sign: ' ',
+            names: vec![interrupted(one)],
+            events: vec![Vec::new()],
+            ..Phrase::default()
+        });
+        frame.caption = during.chain(groups.into_values().map(plural)).collect();
         frame.note = self.note(frame, after);
     }
 

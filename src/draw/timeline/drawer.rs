@@ -291,6 +291,9 @@ impl Drawer {
                 );
             }
         }
+        for hole in &self.timeline.interruptions {
+            canvas.fill(self.axis.rect(*hole, top, bottom - top), ink::BAND[0]);
+        }
         for (k, phase) in phases.iter().enumerate() {
             let cell = self.axis.rect(phase.span, self.top, BAND.0);
             canvas.fill(cell, ink::BAND[k % 2]);

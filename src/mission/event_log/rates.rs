@@ -20,6 +20,10 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
             {
                 continue;
             }
+            let factor = after.hz() / before.hz();
+            if context.history.simulation.explains(after.first, factor) {
+                continue;
+            }
             let width = before.period.max(after.period);
             let at = Bound {
                 time: after.first,

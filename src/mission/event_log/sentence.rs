@@ -208,6 +208,12 @@ pub(crate) fn interrupted(one: &Interruption) -> String {
     match one.kind {
         InterruptionKind::ClockBack => format!("the recorder's clock went back by {length}"),
         InterruptionKind::Nothing => format!("nothing was recorded for {length}"),
+        InterruptionKind::SimulationBack => format!("simulated time went back by {length}"),
+        InterruptionKind::SimulationPaused => format!("simulation paused for {length}"),
+        InterruptionKind::SimulationSpeed => {
+            let speed = f64::from(one.percent) / 100.0;
+            format!("the simulation runs at {speed} of its speed for {length}")
+        }
     }
 }
 
