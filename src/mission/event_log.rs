@@ -220,6 +220,18 @@ pub struct Interruption {
     pub percent: u32,
 }
 
+impl Interruption {
+    /// The time in which nothing happens, without length where a clock went back; `None` if the simulation goes on.
+    pub(crate) fn hole(&self) -> Option<Span> {
+        let length = match self.kind {
+            InterruptionKind::ClockBack | InterruptionKind::SimulationBack => 0,
+            InterruptionKind::Nothing | InterruptionKind::SimulationPaused => self.length,
+            InterruptionKind::SimulationSpeed => return None,
+        };
+        Some(Span::new(self.time, self.time.plus(length)))
+    }
+}
+
 worded! {
     /// The kind of an interruption.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -328,18 +340,6 @@ impl EventLog {
             }
         }
         found
-    }
-
-    /// The times of interruptions, which have no length where a clock went back; without those in which the simulation goes on.
-    pub(crate) fn holes(&self) -> impl Iterator<Item = Span> + '_ {
-        let all = self.interruptions.iter();
-        all.filter_map(|one| match one.kind {
-            InterruptionKind::ClockBack | InterruptionKind::SimulationBack => {
-                Some(Span::new(one.time, one.time))
-            }
-            InterruptionKind::SimulationSpeed => None,
-            _ => Some(Span::new(one.time, one.time.plus(one.length))),
-        })
     }
 
     /// The ids of the parts of all events, in order, by the ids of those events.
