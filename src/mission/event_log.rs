@@ -200,6 +200,13 @@ pub struct Event {
 }
 
 impl Event {
+    /// For how long it lasts, in nanoseconds, if that is known: a node that restarts is away for some time between the last sign
+    /// before and the first after it.
+    pub fn lasted(&self) -> Option<i64> {
+        let is_known = |until: &Stamp| self.kind != Kind::Restarted || self.latest < *until;
+        Some(self.until.filter(is_known)?.since(self.time))
+    }
+
     /// Whether it is shown separately: neither quiet nor part of another.
     pub fn is_headline(&self) -> bool {
         !self.quiet && self.part_of.is_none()

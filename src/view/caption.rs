@@ -226,8 +226,7 @@ impl<'a> CaptionWriter<'a> {
             Kind::Silent => Said::new(3, ' ', name, "falls silent"),
             Kind::Started => Said::new(4, '+', name, "starts"),
             Kind::Restarted => {
-                let away = event.and_then(|e| Some(e.until?.since(e.time)));
-                let away = away.filter(|nanos| *nanos > 0).map(words::duration);
+                let away = event.and_then(|e| e.lasted()).map(words::duration);
                 let tail = away.map_or("restarts".to_owned(), |away| {
                     format!("restarts after {away}")
                 });

@@ -445,7 +445,11 @@ impl Frame {
 
     /// Whether an event or an interruption begins in it, or an event ends.
     pub fn is_changed(&self) -> bool {
-        let is_interrupted = self.caption.iter().flat_map(|p| &p.events).any(Vec::is_empty);
+        let is_interrupted = self
+            .caption
+            .iter()
+            .flat_map(|p| &p.events)
+            .any(Vec::is_empty);
         let mut lasting = self.lasting.iter();
         is_interrupted || !self.headlines.is_empty() || lasting.any(|l| l.ended.is_some())
     }

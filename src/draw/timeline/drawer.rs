@@ -292,9 +292,17 @@ impl Drawer {
                 );
             }
         }
-        let holes = self.timeline.interruptions.iter().filter_map(Interruption::hole);
+        let holes = self
+            .timeline
+            .interruptions
+            .iter()
+            .filter_map(Interruption::hole);
         for hole in holes {
-            let color = if hole.nanos() > 0 { ink::BAND[0] } else { ink::RULE };
+            let color = if hole.nanos() > 0 {
+                ink::BAND[0]
+            } else {
+                ink::RULE
+            };
             canvas.fill(self.axis.rect(hole, top, bottom - top), color);
         }
         for (k, phase) in phases.iter().enumerate() {
