@@ -36,7 +36,7 @@ use source::Read::{Log, Parameters, Payload};
 use source::{
     NOTHING, action, connection, contract, conventions, diagnostics, discovery, echo, equal_stamps,
     lifecycle, log_text, parameters, payload, qos, recorder, rosgraph, rosout, service_event,
-    sister, statistics,
+    sim_time, sister, statistics,
 };
 
 /// A set of kinds of evidence: bits at the indices of rows in [`SOURCES`].
@@ -177,10 +177,12 @@ pub const SOURCES: &[Source] = sources! {
         { reads: &[(&[parameters::SHAPE], Parameters(parameters::read_node))] }
     "qos_overrides" "`qos_overrides.<topic>` in parameter events, which rclcpp declares with each end"
         { reads: &[(&[parameters::SHAPE], Parameters(parameters::read_overrides))] }
-    "sim_time" "`use_sim_time` in parameter events: such a node subscribes to `/clock`"
-        { reads: &[(&[parameters::SHAPE], Parameters(parameters::read_sim_time))], own: true }
-    "links" "log records of roscpp about its connections"
-        { reads: &[(dynamic::ROS1_LOGS, Log(log_text::read_links))] }
+    "sim_time" "`use_sim_time` in parameter events, in ROS 1 stamps in the time of `/clock`: such a node subscribes to it"
+        { reads: &[(&[parameters::SHAPE], Parameters(sim_time::read_parameters)), (&[sim_time::CLOCK], Payload(sim_time::read_clock))],
+          conclude: &[sim_time::conclude],
+          own: true }
+    "links" "log records of roscpp about its connections, and of recorders about the topics they find"
+        { reads: &[(dynamic::LOGS, Log(log_text::read_links))], conclude: &[log_text::conclude_births] }
     "diagnostics" "statuses are named after their nodes; the publisher of `/diagnostics_agg` subscribes to `/diagnostics`"
         { reads: &[(&[diagnostics::SHAPE], Payload(diagnostics::read))], conclude: &[diagnostics::conclude] }
     "rosout" "log records of ROS 1 (`rosgraph_msgs/Log`) and ROS 2 (`rcl_interfaces/msg/Log`)"

@@ -431,3 +431,87 @@ fn what_two_recorders_recorded_counts_once() {
         .filter(|e| e.kind == Kind::Stopped);
     assert_eq!(stopped.count(), 0);
 }
+
+/// A minute of three nodes in a simulation and of `/joystick`, which runs in wall time; `simulated` is the simulated time for
+/// the milliseconds since the start, and without it nothing of the simulation is recorded.
+fn simulation(simulated: impl Fn(i64) -> Option<i64>) -> Recording {
+    let mut bag = Recording::default();
+    let clock = bag.publisher("/gazebo", "/clock", "rosgraph_msgs/Clock");
+    "time clock\n".clone_into(&mut bag.publishers[clock].definition);
+    let joystick = bag.publisher("/joystick", "/joy", "test/Stamped");
+    let robot = ["/base", "/lidar", "/nav"];
+    let robot = robot.map(|node| bag.publisher(node, &format!("{node}/data"), "test/Stamped"));
+    for place in [&robot[..], &[joystick]].concat() {
+        bag.publishers[place].definition =
+            "Header header\n====\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
+                .to_owned();
+    }
+    let time = |millis: i64| [millis / 1000, millis % 1000 * 1_000_000];
+    let bytes = |numbers: &[i64]| -> Vec<u8> {
+        let numbers = numbers.iter().map(|n| u32::try_from(*n).unwrap());
+        numbers.flat_map(u32::to_le_bytes).collect()
+    };
+    let stamped = |at: i64, millis| bytes(&[&[at / 100][..], &time(millis), &[0]].concat());
+    for at in (0..60_000).step_by(100) {
+        let now = ORIGIN + at * 1_000_000;
+        bag.messages
+            .push((joystick, now, stamped(at, now / 1_000_000)));
+        let Some(millis) = simulated(at) else {
+            continue;
+        };
+        bag.messages.push((clock, now, bytes(&time(millis))));
+        for place in robot {
+            bag.messages.push((place, now, stamped(at, millis)));
+        }
+    }
+    bag
+}
+
+#[test]
+fn what_simulated_time_does_is_in_the_log_and_explains_silences() {
+    let found = |simulated: &dyn Fn(i64) -> Option<i64>| shown("", &[simulation(simulated)]);
+    assert_eq!(found(&|at| Some(5_000 + at)), ":\n");
+    let paused = found(&|at| match at {
+        ..30_000 => Some(5_000 + at),
+        ..36_000 => None,
+        _ => Some(at - 1_000),
+    });
+    assert_eq!(paused, ":\n  simulation_paused at 29 s: 6.1 s\n");
+    let back = found(&|at| Some(if at < 30_000 { 50_000 } else { 5_000 } + at));
+    assert_eq!(back, ":\n  simulation_back at 30 s: 44.9 s\n");
+    // The recorder paused.
+    let hole = found(&|at| (!(30_000..36_000).contains(&at)).then_some(5_000 + at));
+    assert!(!hole.contains("simulation"), "{hole}");
+}
+
+#[test]
+fn the_rates_of_a_slower_simulation_are_no_changes() {
+    let mut bag = simulation(|at| Some(5_000 + at));
+    for (publisher, at, _) in &mut bag.messages {
+        let since = *at - ORIGIN - 20 * SECOND;
+        // `/clock`, and the three nodes in the simulation.
+        if *publisher != 1 && since > 0 {
+            *at += since;
+        }
+    }
+    bag.messages.sort_by_key(|message| message.1);
+    let slow = mission(&[bag], |_, _| {});
+    let [one] = slow.log.interruptions[..] else {
+        panic!("{}", details(&slow));
+    };
+    let starts = slow.offset(one.time) / SECOND;
+    assert_eq!((one.kind.word(), one.percent), ("simulation_speed", 50));
+    assert!((18..=22).contains(&starts), "{starts}");
+    let rates = slow.log.events.iter().filter(|e| e.kind == Kind::Rate);
+    assert_eq!(rates.count(), 0);
+}
+
+#[test]
+fn nodes_with_stamps_in_simulated_time_subscribe_to_the_clock() {
+    let mission = mission(&[simulation(|at| Some(5_000 + at))], |_, _| {});
+    let elements = &mission.elements;
+    let edges = elements.subscribes.iter();
+    let nodes = edges.map(|edge| elements.nodes[edge.node].name.to_string());
+    let nodes: Vec<String> = nodes.filter(|node| node != "/rosout").collect();
+    assert_eq!(nodes, ["/base", "/lidar", "/nav"]);
+}

@@ -23,6 +23,8 @@ pub(crate) const UNUSUAL: i64 = 3;
 pub(crate) const OFTEN: usize = 4;
 /// The length of a silence as a multiple of the longest pause that the same sender made before.
 pub(crate) const LONGER: i64 = 2;
+/// The most pauses of a recording, a silence among them, that are at least half as long: of more, the first is as usual as the last.
+pub(crate) const ALIKE: usize = 3;
 /// The number of intervals before a silence that show the usual one: enough to include a pause, few enough to
 /// exclude an earlier rate.
 pub(crate) const RECENT: usize = 20;
@@ -60,6 +62,15 @@ pub(crate) const PAUSE_FEWEST: u64 = 3;
 pub(crate) const PAUSE_MOST: f64 = 5.0;
 pub(crate) const PAUSE_MOST_SHARE: f64 = 0.01;
 
+/// The part of a recording over which the speed of a simulation is measured, since clocks tick once a second or more often;
+/// and the shortest time for which a speed lasts: with less, each hesitation of a simulator would be one.
+pub(crate) const SPEED_NS: i64 = 2 * SECOND;
+pub(crate) const SPEED_HOLDS_NS: i64 = 10 * SECOND;
+/// The percentage of the topics with a steady rate that change it by one factor at once if the clock that is not recorded does;
+/// and the fewest such topics, and named nodes that send them: a camera with its drivers has as many topics, in one or two nodes.
+pub(crate) const SPEED_SHARE: usize = 80;
+pub(crate) const SPEED_FEWEST: (usize, usize) = (5, 3);
+
 // ---- Starts and restarts.
 
 /// The largest number of a log record that shows a start: the first record of a process.
@@ -67,6 +78,9 @@ pub(crate) const FIRST_RECORD: u32 = 1;
 /// The largest number in the header of the first message that a recorder gets of a publisher that has just begun: it
 /// connects within a second, and misses a few.
 pub(crate) const BEGUN_AGAIN: u32 = 5;
+/// The least number before a fall to at most [`BEGUN_AGAIN`] that needs no gap: messages of one publisher arrive at most a few places
+/// out of order.
+pub(crate) const BEGUN_LONG: u32 = 20;
 
 /// The time after its first sign within which a node of ROS 2 declares its parameters; a declaration later than that is another
 /// start. Of the public recordings, 73 contain parameter events, and none a node that declares them again.
@@ -103,6 +117,8 @@ pub(crate) const GAP_NS: i64 = SECOND;
 pub(crate) const SAME_RATE: f64 = 1.1;
 /// The largest ratio of the quartiles of even intervals.
 pub(crate) const EVEN: f64 = 1.8;
+/// The largest ratio of the quartiles of sums of two even intervals, which scatter less by the square root of two.
+pub(crate) const EVEN_OF_TWO: f64 = 1.5;
 /// The fewest messages at a rate for it to be an event: five intervals.
 pub(crate) const FEWEST_OF_RATE: u64 = 6;
 /// The shortest duration of a rate that is an event.

@@ -18,6 +18,7 @@ pub(crate) mod rows;
 pub(crate) mod source;
 
 use crate::base::time::Span;
+use crate::mission::event_log::Interruption;
 use marks::RowMark;
 use phases::PhaseLabel;
 use rows::Row;
@@ -30,6 +31,8 @@ pub struct Timeline {
     pub(crate) span: Span,
     /// The phases; none if there is only one.
     pub(crate) phases: Vec<PhaseLabel>,
+    /// What interrupts it.
+    pub(crate) interruptions: Vec<Interruption>,
     /// The rows.
     pub(crate) rows: Vec<Row>,
 }
@@ -40,6 +43,7 @@ impl Timeline {
         Self {
             span: source.span(),
             phases: phases::numbered(source),
+            interruptions: source.mission.log.interruptions.clone(),
             rows,
         }
     }

@@ -20,7 +20,7 @@ pub(crate) const FAR_DAYS: i64 = 365;
 const RARE: u64 = 10;
 /// The days after 1970, ten years, that count as an unset clock: without a battery it begins there, and no robot
 /// recorded then.
-const UNSET_DAYS: i64 = 3652;
+pub(crate) const UNSET_DAYS: i64 = 3652;
 
 /// Days without a gap of more than [`FAR_DAYS`] between them.
 #[derive(Clone, Copy, PartialEq, Eq)]

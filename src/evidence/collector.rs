@@ -20,7 +20,7 @@ use crate::evidence::message::dynamic::MessageSchema;
 use crate::evidence::numbers::{Numbers, is_numbered};
 use crate::evidence::observation::{Observations, SourceId};
 use crate::evidence::source::equal_stamps::{self, FirstHeader};
-use crate::evidence::source::{self, Read, SourceContext, echo, payload};
+use crate::evidence::source::{self, Read, SourceContext, echo, payload, sim_time};
 use crate::evidence::times::Stamps;
 use crate::evidence::{SOURCES, publishers};
 
@@ -235,6 +235,9 @@ impl Collector {
             source: 0,
             time: Some(message.time),
         };
+        if self.numbers.some(place).is_some() {
+            sim_time::stamped(&mut context, message.data);
+        }
         if let Some(header) = layout.header
             && self.options.infer_stamps
         {

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use crate::bag::{Connection, Encoding};
-use crate::base::rhythm::{BEGUN_AGAIN, GAP_NS};
+use crate::base::rhythm::{BEGUN_AGAIN, BEGUN_LONG, FIRST_RECORD, GAP_NS};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::message::dynamic::MessageSchema;
 
@@ -31,9 +31,20 @@ impl Number {
         })
     }
 
+    /// The stamp as a time.
+    pub(crate) fn time(self) -> Stamp {
+        let [seconds, nanos] = [self.stamp, self.stamp >> 32].map(|part| part & 0xffff_ffff);
+        Stamp((seconds * 1_000_000_000 + nanos).cast_signed())
+    }
+
     /// Whether it is so small, after `before`, that its publisher may just have started.
     pub(crate) fn begins_after(self, before: Self) -> bool {
-        self.number <= BEGUN_AGAIN && self.number < before.number
+        self.number <= BEGUN_AGAIN && self.number < before.number || self.is_first_after(before)
+    }
+
+    /// Whether both are the first of a process, and not copies of one message.
+    fn is_first_after(self, before: Self) -> bool {
+        [self.number, before.number] == [FIRST_RECORD; 2] && self.stamp != before.stamp
     }
 }
 
@@ -63,10 +74,12 @@ impl Numbers {
             None => self.keep(time, number),
             Some((since, before)) => {
                 self.grew += u64::from(number.number > before.number);
-                if number.number < before.number && self.fell.len() < MOST {
+                let falls = number.number < before.number || number.is_first_after(before);
+                if falls && self.fell.len() < MOST {
                     self.fell.push(time);
                 }
-                if number.begins_after(before) && time.since(since) >= GAP_NS {
+                let is_sure = time.since(since) >= GAP_NS || before.number > BEGUN_LONG;
+                if number.begins_after(before) && is_sure {
                     self.keep(since, before);
                     self.keep(time, number);
                     if self.falls.len() < MOST {

@@ -201,6 +201,11 @@ pub(crate) struct Observations {
     /// The ages of messages by their header stamps, by the streams' indices; stored in place of sizes
     /// ([`age_of`]).
     pub(crate) ages: ById<usize, Option<SeriesId>>,
+    /// Simulated times, by the indices of the streams of `/clock`, in milliseconds in place of sizes; and the last one with its bag.
+    pub(crate) clocks: ById<usize, Option<SeriesId>>,
+    pub(crate) clock: Option<(usize, Stamp)>,
+    /// The numbers of stamps in simulated time, by the streams' indices.
+    pub(crate) simulated: BTreeMap<usize, u32>,
     /// Statistics, in the order in which they were read.
     pub(crate) measured: Vec<Measurement>,
     /// The hashes of payloads, by the streams' indices; stored in place of sizes.
@@ -316,6 +321,15 @@ impl Observations {
         }
     }
 
+    /// Adds a simulated time of the stream at index `place` of a bag.
+    pub(crate) fn tick(&mut self, (place, bag): (usize, usize), time: Stamp, simulated: Stamp) {
+        self.clock = Some((bag, simulated));
+        // Steps are measured modulo 2^32 ms, which is 49 days.
+        let millis = simulated.0.div_euclid(1_000_000).rem_euclid(1 << 32);
+        let millis = u32::try_from(millis).unwrap_or_default();
+        note(&mut self.times, &mut self.clocks, place, (time, millis));
+    }
+
     /// Adds a statistic, up to the limit.
     pub(crate) fn measure(&mut self, measurement: Measurement) {
         if self.measured.len() < budget::MEASUREMENTS {
@@ -346,7 +360,8 @@ impl Observations {
         let Some(times) = Arc::get_mut(&mut self.times) else {
             return Ok(());
         };
-        for series in self.payloads.iter().chain(&self.ages).flatten() {
+        let kept = self.payloads.iter().chain(&self.ages).chain(&self.clocks);
+        for series in kept.flatten() {
             times.clip(*series, span)?;
         }
         let mut left = Vec::new();

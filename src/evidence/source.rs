@@ -18,6 +18,7 @@ pub(crate) mod recorder;
 pub(crate) mod rosgraph;
 pub(crate) mod rosout;
 pub(crate) mod service_event;
+pub(crate) mod sim_time;
 pub(crate) mod sister;
 pub(crate) mod statistics;
 

@@ -3,7 +3,7 @@
 //!
 //! In: everything recorded, and the findings. Out: a [`History`], made once, from which windows, events, phases and figures
 //! are derived; nothing here depends on windows. Begin with `records`, which calls the others in order: `senders` reads the
-//! times of every topic, `restarts` and `pauses` find restarts and the pauses of `recordings` in them, `liveness` collects the signs
+//! times of every topic, `restarts`, `pauses` and `simulation` find restarts and the pauses of `recordings` and simulators in them, `liveness` collects the signs
 //! of each element, `lifetimes` decides when it existed.
 
 mod lifetimes;
@@ -13,6 +13,7 @@ mod recordings;
 pub(crate) mod records;
 mod restarts;
 pub(crate) mod senders;
+pub(crate) mod simulation;
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -21,7 +22,9 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::{ById, Element, Elements, Graphs, NodeId, State, TopicId};
-use crate::base::rhythm::{FEWEST, LONGER, OFTEN, SAME_RATE, STEADY, STEADY_NS, broken_after};
+use crate::base::rhythm::{
+    ALIKE, FEWEST, LONGER, OFTEN, SAME_RATE, STEADY, STEADY_NS, broken_after,
+};
 use crate::base::time::{Span, Stamp};
 
 pub(crate) use records::{History, Record, made};
@@ -60,7 +63,7 @@ pub struct Stretch {
     pub last: Stamp,
     /// The number of messages, ≥ 1.
     pub count: u64,
-    /// The median time between messages in nanoseconds; 0 with fewer than two.
+    /// The usual time between messages in nanoseconds, without lost ones; 0 with fewer than two.
     pub period: i64,
     /// Whether the messages come at even intervals.
     pub is_even: bool,
@@ -100,9 +103,12 @@ impl Stretch {
             return 0.0;
         }
         let mean = nanos as f64 / (self.count - 1).max(1) as f64;
-        let median = self.period as f64;
-        // The median is not affected by a few lost messages, but it is meaningless for messages in pairs.
-        let period = if self.is_even { median } else { mean };
+        // Lost messages do not affect the usual time, which uneven messages do not have.
+        let period = if self.is_even {
+            self.period as f64
+        } else {
+            mean
+        };
         1e9 / period.max(1.0)
     }
 }
@@ -285,6 +291,12 @@ pub(crate) fn hide(pauses: &[Span], (from, to): Silence) -> bool {
 /// from the last message to the next, or `None` if there is none. A sender of bursts is never silent.
 pub(crate) fn silences(stretches: &[Stretch], lives: &[Span], pauses: &[Span]) -> Vec<Silence> {
     let mut found = Vec::new();
+    let gaps = stretches
+        .windows(2)
+        .map(|pair| (pair[0].last, Some(pair[1].first)));
+    let gaps = gaps.filter(|gap| !hide(pauses, *gap));
+    let gaps = gaps.map(|(from, to)| to.map_or(0, |to| to.since(from)));
+    let gaps: Vec<i64> = gaps.collect();
     for life in lives {
         let inside = |s: &&Stretch| life.start <= s.first && s.first < life.end;
         let own: Vec<&Stretch> = stretches.iter().filter(inside).collect();
@@ -296,7 +308,10 @@ pub(crate) fn silences(stretches: &[Stretch], lives: &[Span], pauses: &[Span]) -
             }
             let silence = next.unwrap_or(life.end).since(stretch.last);
             let usual = broken_after(stretch.period).max(LONGER.saturating_mul(longest));
-            let long = silence > usual;
+            let comparable = gaps
+                .iter()
+                .filter(|gap| gap.saturating_mul(LONGER) >= silence);
+            let long = silence > usual && comparable.count() <= ALIKE;
             longest = longest.max(silence);
             if stretch.is_even && stretch.count >= FEWEST && long {
                 found.push((stretch.last, next));
@@ -308,7 +323,7 @@ pub(crate) fn silences(stretches: &[Stretch], lives: &[Span], pauses: &[Span]) -
         .iter()
         .filter_map(|(from, to)| Some((*to)?.since(*from)))
         .sum();
-    if found.len() > OFTEN && quiet > sending / 4 {
+    if found.len() > OFTEN && quiet > sending / 4 || found.len() > 1 && quiet > sending {
         found.clear();
     }
     found

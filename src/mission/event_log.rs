@@ -27,7 +27,7 @@ use crate::evidence::{Confidence, Evidence};
 use crate::graph::{ById, Element, NodeId};
 
 pub(crate) use drafts::{LogInput, sorted, sorted_by};
-pub(crate) use sentence::{predicate, sentence, sentence_with};
+pub(crate) use sentence::{interrupted, predicate, sentence, sentence_with};
 pub use written::{LogFormat, LogLine, LogOptions, log};
 pub(crate) use written::{LogRow, body, headlines, lines, quoted, row_lines, whole};
 
@@ -227,6 +227,13 @@ pub struct Event {
 }
 
 impl Event {
+    /// For how long it lasts, in nanoseconds, if that is known: a node that restarts is away for some time between the last sign
+    /// before and the first after it.
+    pub fn lasted(&self) -> Option<i64> {
+        let is_known = |until: &Stamp| self.kind != Kind::Restarted || self.latest < *until;
+        Some(self.until.filter(is_known)?.since(self.time))
+    }
+
     /// Whether it is shown separately: neither quiet nor part of another.
     pub fn is_headline(&self) -> bool {
         !self.quiet && self.part_of.is_none()
@@ -241,8 +248,22 @@ pub struct Interruption {
     pub time: Stamp,
     /// The kind.
     pub kind: InterruptionKind,
-    /// The time by which the clock went back, or for which nothing was recorded, in nanoseconds, ≥ 0.
+    /// The time by which the clock went back, or for which it lasted, in nanoseconds, ≥ 0.
     pub length: i64,
+    /// The speed of a simulation in percent of the recorder's clock; 100 in all other kinds.
+    pub percent: u32,
+}
+
+impl Interruption {
+    /// The time in which nothing happens, without length where a clock went back; `None` if the simulation goes on.
+    pub(crate) fn hole(&self) -> Option<Span> {
+        let length = match self.kind {
+            InterruptionKind::ClockBack | InterruptionKind::SimulationBack => 0,
+            InterruptionKind::Nothing | InterruptionKind::SimulationPaused => self.length,
+            InterruptionKind::SimulationSpeed => return None,
+        };
+        Some(Span::new(self.time, self.time.plus(length)))
+    }
 }
 
 worded! {
@@ -255,6 +276,12 @@ worded! {
         ClockBack = "clock_back",
         /// Nothing was recorded: the recorder paused, or its clock was set ahead.
         Nothing = "nothing_recorded",
+        /// Simulated time was set back, according to `/clock`.
+        SimulationBack = "simulation_back",
+        /// Simulated time stood still.
+        SimulationPaused = "simulation_paused",
+        /// Simulated time had another speed than the recorder's clock, or than at the beginning.
+        SimulationSpeed = "simulation_speed",
     }
 }
 

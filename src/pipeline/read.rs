@@ -10,17 +10,20 @@ use super::phases::{Basis, wanted};
 use super::probe::probe;
 use super::verify::{Verified, verify};
 use super::{Phases, Stage, Watch};
+use crate::bag::straight::ClockFall;
 use crate::bag::{self, Input, InputKind, Report};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
+use crate::base::rhythm::CLOSE_NS;
 use crate::base::time::{Span, Stamp};
-use crate::base::{budget, file, words};
+use crate::base::{budget, cast, file, words};
 use crate::evidence::EvidenceLine;
 #[cfg(feature = "source")]
 use crate::evidence::code::{self, SourceCode};
 use crate::evidence::collector::{self, Recorded};
 use crate::evidence::conclude::{self, Findings, conclude};
 use crate::graph::history::Sending;
+use crate::graph::history::simulation::ClockChange;
 use crate::graph::window::{self, Cut, Division, Length, Windows};
 use crate::graph::{History, NodeId, Windowed, graphs, made, traffic, unread};
 use crate::mission::RATE_CHANGE;
@@ -371,17 +374,40 @@ fn log_of(history: &History, collected: &Collected, reading: &Reading) -> Result
         whole: collected.range,
         earlier: Vec::new(),
     };
-    let back = collected.recorded.falls.iter().map(|fall| Interruption {
-        time: fall.time,
-        kind: InterruptionKind::ClockBack,
-        length: fall.length,
+    let one = |time, kind, length| Interruption {
+        time,
+        kind,
+        length,
+        percent: 100,
+    };
+    let simulated = history.simulation.changes.iter().map(|(span, what)| {
+        let (kind, length, speed) = match *what {
+            ClockChange::Back(length) => (InterruptionKind::SimulationBack, length, 1.0),
+            ClockChange::Paused => (InterruptionKind::SimulationPaused, span.nanos(), 1.0),
+            ClockChange::Speed(speed) => (InterruptionKind::SimulationSpeed, span.nanos(), speed),
+        };
+        let percent = cast::to_u32(libm::round(speed * 100.0));
+        Interruption {
+            percent,
+            ..one(span.start, kind, length)
+        }
     });
-    let nothing = history.pauses.iter().map(|pause| Interruption {
-        time: pause.start,
-        kind: InterruptionKind::Nothing,
-        length: pause.nanos(),
-    });
-    let mut interruptions: Vec<Interruption> = back.chain(nothing).collect();
+    let mut interruptions: Vec<Interruption> = simulated.collect();
+    // In a recording in simulated time, the recorder's clock is that of the simulation.
+    let is_simulated = |fall: &&ClockFall| {
+        let mut all = history.simulation.changes.iter();
+        all.any(|(span, what)| {
+            let is_back = matches!(what, ClockChange::Back(_));
+            is_back && span.start.since(fall.time).abs() <= CLOSE_NS
+        })
+    };
+    let falls = collected.recorded.falls.iter();
+    let back = falls.filter(|fall| !is_simulated(fall));
+    interruptions.extend(back.map(|fall| one(fall.time, InterruptionKind::ClockBack, fall.length)));
+    let is_paused = |pause: &&Span| history.simulation.pauses().any(|own| own == **pause);
+    let nothing = history.pauses.iter().filter(|pause| !is_paused(pause));
+    interruptions
+        .extend(nothing.map(|pause| one(pause.start, InterruptionKind::Nothing, pause.nanos())));
     interruptions.sort_unstable();
     Ok(EventLog {
         interruptions,

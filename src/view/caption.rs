@@ -12,7 +12,7 @@ use crate::base::time::Stamp;
 use crate::base::words;
 use crate::graph::{Element, Elements, NodeId, TopicId, Wiring};
 use crate::mission::Mission;
-use crate::mission::event_log::{Detail, EventId, EventLog, Kind, Parts};
+use crate::mission::event_log::{Detail, EventId, EventLog, Kind, Parts, interrupted};
 
 /// The largest length of a name in characters; longer ones would fill a headline alone.
 const LONGEST_NAME: usize = 48;
@@ -97,7 +97,18 @@ impl<'a> CaptionWriter<'a> {
         for ongoing in &frame.ongoing {
             self.ongoing(ongoing).add(&mut groups, ongoing.event);
         }
-        frame.caption = groups.into_values().map(plural).collect();
+        let (log, span) = (self.log, frame.span);
+        let during = log
+            .interruptions
+            .iter()
+            .filter(|one| span.contains(one.time));
+        let during = during.map(|one| Phrase {
+            sign: ' ',
+            names: vec![interrupted(one)],
+            events: vec![Vec::new()],
+            ..Phrase::default()
+        });
+        frame.caption = during.chain(groups.into_values().map(plural)).collect();
         frame.note = self.note(frame, after);
     }
 
@@ -222,8 +233,7 @@ impl<'a> CaptionWriter<'a> {
             Kind::Silent => Said::new(3, ' ', name, "falls silent"),
             Kind::Started => Said::new(4, '+', name, "starts"),
             Kind::Restarted => {
-                let away = event.and_then(|e| Some(e.until?.since(e.time)));
-                let away = away.filter(|nanos| *nanos > 0).map(words::duration);
+                let away = event.and_then(|e| e.lasted()).map(words::duration);
                 let tail = away.map_or("restarts".to_owned(), |away| {
                     format!("restarts after {away}")
                 });

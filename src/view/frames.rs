@@ -371,7 +371,7 @@ pub struct Phrase {
     pub lead: String,
     /// The names.
     pub names: Vec<String>,
-    /// The events of each name: indices in the event log.
+    /// The events of each name: indices in the event log; none for an interruption.
     pub events: Vec<Vec<EventId>>,
     /// The words after the names: `start`.
     pub tail: String,
@@ -443,9 +443,15 @@ impl Frame {
         !events.is_empty() && events.iter().all(is_of_many)
     }
 
-    /// Whether an event begins or ends in it.
+    /// Whether an event or an interruption begins in it, or an event ends.
     pub fn is_changed(&self) -> bool {
-        !self.headlines.is_empty() || self.ongoing.iter().any(|l| l.ended.is_some())
+        let is_interrupted = self
+            .caption
+            .iter()
+            .flat_map(|p| &p.events)
+            .any(Vec::is_empty);
+        let mut ongoing = self.ongoing.iter();
+        is_interrupted || !self.headlines.is_empty() || ongoing.any(|l| l.ended.is_some())
     }
 
     /// The time that its drawing shows.

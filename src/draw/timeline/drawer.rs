@@ -12,6 +12,7 @@ use crate::base::time::{Span, Stamp, round_length};
 use crate::base::words;
 use crate::draw::scene::{Form, Group, Shape, Stroke};
 use crate::draw::style::{Color, Style};
+use crate::mission::event_log::Interruption;
 
 /// The height of the band of phases, and the space below it, in millimetres.
 const BAND: (f64, f64) = (3.3, 0.9);
@@ -294,6 +295,19 @@ impl Drawer {
                     &dashed,
                 );
             }
+        }
+        let holes = self
+            .timeline
+            .interruptions
+            .iter()
+            .filter_map(Interruption::hole);
+        for hole in holes {
+            let color = if hole.nanos() > 0 {
+                ink::BAND[0]
+            } else {
+                ink::RULE
+            };
+            canvas.fill(self.axis.rect(hole, top, bottom - top), color);
         }
         for (k, phase) in phases.iter().enumerate() {
             let cell = self.axis.rect(phase.span, self.top, BAND.0);

@@ -11,6 +11,7 @@ use crate::base::name::last_part;
 use crate::base::time::Span;
 use crate::base::words;
 use crate::draw::scene::Stroke;
+use crate::mission::event_log::{Interruption, interrupted};
 
 /// The most names of one kind that are reported in a note; the others are counted.
 pub(crate) const MOST_NAMED: usize = 60;
@@ -31,9 +32,13 @@ pub(crate) fn letters(timeline: &Timeline) -> Vec<Unbroken> {
     letters.map(item).collect()
 }
 
-/// The notes: the members of collapsed rows, unless they are beside them.
+/// The notes: the interruptions, and the members of collapsed rows, unless they are beside them.
 pub(crate) fn notes(timeline: &Timeline, is_beside: bool) -> Vec<Unbroken> {
-    let mut items = Vec::new();
+    let note = |one: &Interruption| {
+        let at = clock(one.time.since(timeline.span.start));
+        sentence(ink::TEXT, format!("{at} {}.", interrupted(one)))
+    };
+    let mut items: Vec<Unbroken> = timeline.interruptions.iter().map(note).collect();
     let mut space = "";
     for row in timeline.rows.iter().filter(|_| !is_beside) {
         if row.level == Level::Title {

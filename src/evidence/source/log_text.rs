@@ -2,12 +2,14 @@
 //! incompatible quality of service, of Gazebo's plugins, its bridge and rosserial about their endpoints), of two nodes of one name,
 //! and of roscpp about its connections.
 
-use crate::base::name::resolved;
+use crate::base::name::{is_log, resolved};
+use crate::base::rhythm::{DISCOVERY_NS, FOUND_NS};
+use crate::base::time::Stamp;
 use crate::evidence::inference::{
-    Conclusions, ElementKey, IncidentKind, Inference, Validity, verb,
+    Conclusions, ElementKey, IncidentKind, Inference, Reliability, Stream, Validity, verb,
 };
-use crate::evidence::message::log::LogRecord;
-use crate::evidence::observation::{Confidence, Observation, SourceId};
+use crate::evidence::message::log::{LogRecord, is_ros1_log};
+use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
 use crate::evidence::source::SourceContext;
 
 pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
@@ -196,15 +198,86 @@ pub(crate) fn conclude_duplicates(source: SourceId, known: &mut Conclusions<'_>)
 // roscpp about its connections: start and end of subscribers (DEBUG), clients with another type, its own subscriptions;
 // and the recorder's `Subscribing to`, which gives the time at which a topic appeared.
 
+/// The topic that a recorder, of ROS 1 or ROS 2, says that it has found.
+fn found_topic(text: &str) -> Option<&str> {
+    let of_ros2 = || {
+        text.strip_prefix("Subscribed to topic '")?
+            .strip_suffix('\'')
+    };
+    text.strip_prefix("Subscribing to ")
+        .map(str::trim)
+        .or_else(of_ros2)
+}
+
+/// A topic began when the recorder of all topics found it, and the only node that publishes it was there then.
+pub(crate) fn conclude_births(source: SourceId, known: &mut Conclusions<'_>) {
+    let mut found: Vec<(Name, Vec<Stamp>)> = Vec::new();
+    for fact in known.observed(source) {
+        if let Observation::Appears(topic) = fact.observation {
+            found.push((topic, known.times(&fact)));
+        }
+    }
+    // Another recorder that starts finds all topics again.
+    let is_later = |from: Stamp, time: &&Stamp| time.since(from) > DISCOVERY_NS;
+    let again = found.iter().flat_map(|(_, times)| {
+        let first = times.first().copied().unwrap_or_default();
+        times.iter().filter(move |time| is_later(first, time))
+    });
+    let mut again: Vec<Stamp> = again.copied().collect();
+    again.sort_unstable();
+    let before = |time: Stamp| again.partition_point(|other| *other <= time);
+    let is_again =
+        |time: Stamp| before(time.plus(FOUND_NS)) - before(time.plus(-FOUND_NS)) >= FEWEST_AGAIN;
+    for (_, times) in &mut found {
+        times.retain(|time| !is_again(*time));
+    }
+    // One that is given a list of topics names all of them when it starts, and need not find any.
+    let births = found.iter().filter_map(|(_, times)| times.first());
+    let is_list = births
+        .clone()
+        .min()
+        .is_none_or(|first| !births.clone().any(|time| is_later(*first, &time)));
+    for (topic, times) in found {
+        let (Some(birth), false) = (times.first().copied(), is_list) else {
+            continue;
+        };
+        if times.iter().any(|time| is_later(birth, &time)) {
+            continue;
+        }
+        let mut streams = known.streams.iter().filter(|stream| stream.topic == topic);
+        let node = streams.clone().find_map(|stream| stream.publisher);
+        let is_own = |s: &Stream| s.publisher == node && s.trust == Reliability::Whole;
+        let is_one = streams.all(is_own) && known.is_recorded(topic) && !is_log(&known.text(topic));
+        if is_one {
+            let what = match node {
+                Some(node) => ElementKey::Publish(node, topic),
+                None => ElementKey::Topic(topic),
+            };
+            let when = Validity::Begins {
+                signs: vec![birth],
+                ends: Vec::new(),
+            };
+            let inference = Inference::new(source, what, Confidence::Stated, when);
+            known.because(inference, Some(birth), |known| {
+                format!("the recorder found {} then", known.text(topic))
+            });
+        }
+    }
+}
+
+/// The fewest topics that a recorder finds again when it starts.
+const FEWEST_AGAIN: usize = 3;
+
 pub(crate) fn read_links(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
     let (name, text, file) = (record.name, record.text, record.file);
     if file.ends_with("recorder.cpp")
-        && let Some(topic) = text.strip_prefix("Subscribing to ")
+        && let Some(topic) = found_topic(text)
     {
-        let topic = context.name(topic.trim());
+        let topic = context.name(topic);
         context.states(Observation::Appears(topic), || format!("{name}: {text}"));
     }
-    let roscpp = file.rsplit('.').next() == Some("cpp");
+    let is_ros1 = is_ros1_log(&context.stream.connection.type_name);
+    let roscpp = is_ros1 && file.rsplit('.').next() == Some("cpp");
     if let Some(link) = link(text).filter(|_| roscpp) {
         let node = context.name(link.node.unwrap_or(name));
         let topic = context.name(link.topic);

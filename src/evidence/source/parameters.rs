@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
 use crate::evidence::message::dynamic::MessageLayout;
-use crate::evidence::observation::{Confidence, Observation};
+use crate::evidence::observation::Observation;
 use crate::evidence::source::SourceContext;
 
 /// `rcl_interfaces/msg/ParameterEvent`.
@@ -137,29 +137,6 @@ fn end_of(parameter: &str) -> Option<(&str, bool)> {
         _ => return None,
     };
     topic.starts_with('/').then_some((topic, publishes))
-}
-
-// `use_sim_time`: a node that runs by simulated time subscribes to `/clock`.
-
-pub(crate) fn read_sim_time(context: &mut SourceContext<'_>, event: &ParameterEvent<'_>) {
-    let set = event.set.iter().rev().find(|p| p.name == "use_sim_time");
-    let Some(simulated) = set.and_then(|p| p.truth).filter(|_| !event.node.is_empty()) else {
-        return;
-    };
-    let (node, clock) = (context.name(event.node), context.name("/clock"));
-    let observation = if simulated {
-        Observation::Subscribe(node, clock)
-    } else {
-        Observation::Unsubscribe(node, clock)
-    };
-    context.observation(observation, Confidence::Inferred, || {
-        let then = if simulated {
-            ""
-        } else {
-            ", so it does not subscribe to /clock"
-        };
-        format!("{} sets use_sim_time to {simulated}{then}", event.node)
-    });
 }
 
 #[cfg(test)]

@@ -24,7 +24,9 @@ pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
     context.states(Observation::Node(node), logs);
     let log = context.stream.topic;
     if is_log(context.stream.connection.topic.as_str()) {
-        if record.number.is_some_and(|number| number <= FIRST_RECORD) {
+        if std::env::var_os("NOFIRST").is_none()
+            && record.number.is_some_and(|number| number <= FIRST_RECORD)
+        {
             let begins = || format!("{name} logs its first record: {text}");
             context.states(Observation::Begins(node), begins);
         }

@@ -123,7 +123,7 @@ impl PageChanges {
             let mut counts = change_counts(&frame.counts).map(|(text, _)| text);
             let returns = frame.ongoing.iter().filter_map(|last| back(frame, last));
             let returns: Vec<ChangeLine> = returns.collect();
-            if frame.headlines.is_empty() {
+            if frame.headlines.is_empty() && !returns.is_empty() {
                 counts[2] = format!("{} back", returns.len());
             }
             let headlines = frame.headlines.iter().take(MOST_REPORTED);

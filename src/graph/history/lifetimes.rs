@@ -404,6 +404,8 @@ pub(crate) struct Liveness {
     pub(crate) ends: Vec<Stamp>,
     /// The times at which something that shows it began, such as a rhythm.
     pub(crate) begins: Vec<Stamp>,
+    /// The times among these at which a recorder found its topics.
+    pub(crate) found: Vec<Stamp>,
     /// The last sign of its own: a message that it sent, or a statement about itself.
     pub(crate) last_sign: Option<Stamp>,
     /// Its messages; boxed, since very many elements may be known without any.
@@ -444,6 +446,7 @@ impl Default for Liveness {
             counted: Vec::new(),
             ends: Vec::new(),
             begins: Vec::new(),
+            found: Vec::new(),
             last_sign: None,
             messages: None,
             speaks: false,
@@ -510,6 +513,7 @@ impl Liveness {
         self.confidence = self.confidence.min(other.confidence);
         self.signs.extend(&other.signs);
         self.begins.extend(&other.begins);
+        self.found.extend(&other.found);
         self.last_sign = self.last_sign.max(other.last_sign);
         if let Some(others) = &other.messages {
             let own = self.messages();
@@ -545,7 +549,11 @@ impl Liveness {
         if let Some(life) = lives.first_mut() {
             let pulses = self.pulses().iter();
             let rhythm = pulses.filter(|p| p.first.since(life.from()) <= DISCOVERY_NS);
-            let period = rhythm.map(|p| p.period).min();
+            let is_found = self
+                .found
+                .iter()
+                .any(|found| found.since(life.from()).abs() <= DISCOVERY_NS);
+            let period = rhythm.map(|p| p.period).chain(is_found.then_some(0)).min();
             let is_absent = |began: Bound| began.earliest > Stamp::MIN;
             let is_near = |begin: &Stamp| begin.since(life.sign).abs() <= ADVERTISED_NS;
             let is_proved = !is_node
@@ -567,7 +575,12 @@ impl Liveness {
         for life in Rc::make_mut(&mut self.lives) {
             if let Some(ended) = life.ended.as_mut().filter(|e| e.time == restart.death) {
                 let latest = restart.death.plus(period.max(SHUTDOWN_NS));
-                ended.latest = latest.min(restart.birth);
+                let is_proved = restart.is_proved;
+                ended.latest = if is_proved {
+                    latest.min(restart.birth)
+                } else {
+                    restart.birth
+                };
                 // The time of the restart is that of the start.
                 if !restart.is_timed() {
                     ended.earliest = restart.death;
@@ -575,7 +588,12 @@ impl Liveness {
             }
             if let Some(began) = life.began.as_mut().filter(|b| b.time == restart.birth) {
                 let earliest = restart.birth.plus(-DISCOVERY_NS - period);
-                began.earliest = earliest.max(restart.death);
+                let is_proved = restart.is_proved;
+                began.earliest = if is_proved {
+                    earliest.max(restart.death)
+                } else {
+                    restart.death
+                };
             }
         }
     }

@@ -104,6 +104,9 @@ pub(crate) fn collect(
                 if !is_rewritten || !is_from(&inference, "rosout") {
                     liveness.begins.extend(signs);
                 }
+                if is_from(&inference, "links") {
+                    liveness.found.extend(signs);
+                }
             }
             Validity::Moments(signs) => liveness.bound_all(signs, &deaths),
             Validity::Unending => liveness.unending = true,

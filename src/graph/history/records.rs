@@ -20,6 +20,7 @@ use crate::graph::history::pauses::pauses;
 use crate::graph::history::recordings::doubled;
 use crate::graph::history::restarts::restarts;
 use crate::graph::history::senders::{Sender as TopicSender, Traffic};
+use crate::graph::history::simulation::{Simulation, simulation};
 use crate::graph::history::{
     Bound, Life, Sender, Sending, Silence, Stretch, Transition, all_silent,
 };
@@ -37,8 +38,10 @@ pub(crate) struct History {
     pub(crate) records: PerElement<Record>,
     /// The messages of every sender.
     pub(crate) sending: Sending,
-    /// The times at which nothing was recorded, sorted.
+    /// The times at which nothing was recorded or the simulation stood still, sorted.
     pub(crate) pauses: Vec<Span>,
+    /// The changes of simulated time.
+    pub(crate) simulation: Simulation,
     /// The nodes that several recordings show at the same time.
     pub(crate) doubled: Vec<NodeId>,
     /// Transitions of lifecycle states, sorted by time.
@@ -135,11 +138,19 @@ fn of_elements(
 ) -> io::Result<History> {
     let doubled = doubled(recorded, &findings.streams);
     let restarts = restarts(recorded, findings, traffic, &doubled)?;
-    let pauses = pauses(recorded, traffic, &restarts, &findings.streams)?;
+    let simulation = simulation(recorded, traffic)?;
+    let mut pauses = pauses(recorded, traffic, &restarts, &findings.streams)?;
+    pauses.retain(|pause| simulation.pauses().all(|own| own.shared(*pause) <= 0));
+    pauses.extend(simulation.pauses());
+    pauses.sort_unstable_by_key(|pause| pause.start);
     let (mut liveness_of, likes) = collect(recorded, findings, traffic, (&restarts, &pauses))?;
     fall_silent(&mut liveness_of, traffic, findings, &pauses);
     compute_lifetimes(&mut liveness_of, &likes, &restarts, findings.mission);
-    Ok(assembled(liveness_of, traffic, findings, (pauses, doubled)))
+    let history = assembled(liveness_of, traffic, findings, (pauses, doubled));
+    Ok(History {
+        simulation,
+        ..history
+    })
 }
 
 /// Lists every element. `liveness_of` is sorted by the elements' names.

@@ -8,23 +8,25 @@ use std::io;
 use crate::base::error::Result;
 use crate::base::ids::{Few, grouped};
 use crate::base::name::is_log;
-use crate::base::rhythm::{DECLARED_NS, FEWEST, GAP, GAP_NS};
+use crate::base::rhythm::{BEGUN_LONG, DECLARED_NS, FEWEST, GAP, GAP_NS, broken_after};
 use crate::base::time::Stamp;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
 use crate::evidence::inference::{Inference, Reliability, Validity};
-use crate::evidence::numbers::Number;
+use crate::evidence::numbers::{Number, Numbers};
 use crate::evidence::observation::Name;
 use crate::evidence::source_word;
 use crate::graph::history::Stretch;
 use crate::graph::history::senders::{Sender, Traffic};
 
-/// A restart of a node: its last sign before, its first one after. If it is not known how long it was away, one is just before the
-/// other.
+/// A restart of a node: its last sign before, its first one after. If it is not known when it was last there, one is just before
+/// the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Restart {
     pub(crate) death: Stamp,
     pub(crate) birth: Stamp,
+    /// Whether rhythms show that it was away from one to the other, not only unseen.
+    pub(crate) is_proved: bool,
 }
 
 impl Restart {
@@ -77,6 +79,22 @@ impl Own<'_> {
             () if is_below(GAP) => Pace::Slow,
             () => Pace::None,
         }
+    }
+
+    /// Whether a rhythm ends at the one time and another begins at the other, as far as their intervals show.
+    fn beats(&self, death: Stamp, birth: Stamp) -> [bool; 2] {
+        let away = birth.since(death);
+        let is_near = |late: i64, s: &Stretch| (0..=broken_after(s.period)).contains(&late);
+        let all = self
+            .sender
+            .stretches
+            .iter()
+            .filter(|_| !self.sender.latched);
+        let mut even = all.filter(|s| s.is_even && s.count >= FEWEST && s.period * 2 <= away);
+        let ends = even
+            .clone()
+            .any(|s| s.first <= death && is_near(death.since(s.last), s));
+        [ends, even.any(|s| is_near(s.first.since(birth), s))]
     }
 
     /// The times of its messages, sorted.
@@ -255,9 +273,20 @@ pub(crate) fn restarts(
         let inferences = said.of(node).iter();
         signs.extend(inferences.copied().flat_map(signs_of));
         signs.sort_unstable();
-        let gaps = breaks.iter();
-        all.grown(node)
-            .extend(gaps.filter_map(|(from, to)| widest_gap(&signs, *from, *to)));
+        let away = breaks.iter().filter_map(|(from, to)| {
+            let is_quick = to.since(*from) < GAP_NS;
+            let quick = Some((*from, *to)).filter(|_| is_quick);
+            quick.or_else(|| widest_gap(&signs, *from, *to))
+        });
+        all.grown(node).extend(away.map(|(death, birth)| {
+            let beats = own.iter().map(|own| own.beats(death, birth));
+            let [ends, begins] = beats.fold([false; 2], |all, [a, b]| [all[0] | a, all[1] | b]);
+            Restart {
+                death,
+                birth,
+                is_proved: ends && begins,
+            }
+        }));
     }
     Ok(all)
 }
@@ -315,10 +344,24 @@ fn falls_of(
         // Between two messages, possibly of two parts of a recording, and the gaps between them.
         let around = |gap: &_| Some((around_all(&streams, *gap)?, *gap));
         let mut breaks = grouped(gaps.iter().filter_map(around));
-        if logs(recorded, one) {
-            // Its numbers are those of all log records of a process, which have no rhythm.
-            breaks.extend(between_records(recorded, &streams).map(|places| (places, Vec::new())));
-        }
+        // The numbers of log records are those of all of a process, which have no rhythm; of other messages, those may start
+        // over at once.
+        let is_log = logs(recorded, one);
+        let is_quick = |from: Place, to: Place| {
+            let numbers = recorded.numbers.some(from.1);
+            let is_high = |numbers: &Numbers| {
+                let before = numbers
+                    .at(from.0)
+                    .is_some_and(|before| before.number > BEGUN_LONG);
+                before
+                    && numbers
+                        .is_one_counter(recorded.messages.count(recorded.streams[from.1].times))
+            };
+            to.0.since(from.0) < GAP_NS && from.1 == to.1 && numbers.is_some_and(is_high)
+        };
+        let between = between_records(recorded, &streams);
+        let between = between.filter(|(from, to)| is_log || is_quick(*from, *to));
+        breaks.extend(between.map(|places| (places, Vec::new())));
         for (((last, before), (next, after)), gaps) in breaks {
             let number = |at: usize, time| recorded.numbers.some(at)?.at(time);
             let numbers = number(before, last).zip(number(after, next));
@@ -386,8 +429,11 @@ fn declared(said: &Few<Name, Vec<&Inference>>) -> Restarts {
         let mut before = first.copied().unwrap_or(Stamp::MAX);
         for birth in starts {
             if birth.since(before) > DECLARED_NS {
-                let death = birth.plus(-1);
-                all.grown(node).push(Restart { death, birth });
+                all.grown(node).push(Restart {
+                    death: birth.plus(-1),
+                    birth,
+                    is_proved: false,
+                });
             }
             before = birth;
         }
@@ -463,14 +509,11 @@ fn narrowed(mut breaks: Vec<(Stamp, Stamp)>) -> Vec<(Stamp, Stamp)> {
 }
 
 /// The longest time between two signs inside an interval, during which the node was away.
-fn widest_gap(signs: &[Stamp], from: Stamp, to: Stamp) -> Option<Restart> {
+fn widest_gap(signs: &[Stamp], from: Stamp, to: Stamp) -> Option<(Stamp, Stamp)> {
     let inside = &signs[signs.partition_point(|t| *t < from)..signs.partition_point(|t| *t <= to)];
     let gaps = inside.windows(2).map(|pair| (pair[1].since(pair[0]), pair));
     let (gap, pair) = gaps.max_by_key(|(gap, pair)| (*gap, std::cmp::Reverse(pair[0])))?;
-    (gap >= GAP_NS).then(|| Restart {
-        death: pair[0],
-        birth: pair[1],
-    })
+    (gap >= GAP_NS).then(|| (pair[0], pair[1]))
 }
 
 #[cfg(test)]
@@ -485,7 +528,7 @@ mod tests {
     fn the_node_was_away_in_the_widest_gap() {
         let signs = stamps(&[1, 2, 3, 20, 21, 22]);
         let found = widest_gap(&signs, signs[1], signs[4]).unwrap();
-        assert_eq!((found.death, found.birth), (signs[2], signs[3]));
+        assert_eq!(found, (signs[2], signs[3]));
     }
 
     #[test]

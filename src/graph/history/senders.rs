@@ -5,7 +5,7 @@ use std::io;
 
 use crate::base::error::Result;
 use crate::base::name::is_feedback;
-use crate::base::rhythm::{EVEN, FEWEST_INTERVALS, GAP, GAP_NS, SAME_RATE};
+use crate::base::rhythm::{EVEN, EVEN_OF_TWO, FEWEST_INTERVALS, GAP, GAP_NS, SAME_RATE};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
@@ -333,23 +333,48 @@ fn scatter(times: &[Stamp], step: usize) -> f64 {
 /// The stretch of a run of messages at one rate.
 fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
     let (first, last) = (*times.first()?, *times.last()?);
-    let mut intervals: Vec<i64> = times.windows(2).map(|t| t[1].since(t[0])).collect();
-    let n = intervals.len();
-    let mut quantile = |part: usize| {
-        if n == 0 {
-            return 0;
-        }
-        *intervals.select_nth_unstable((n * part / 4).min(n - 1)).1
-    };
-    let (lower, period, upper) = (quantile(1), quantile(2), quantile(3));
+    let ([lower, median, upper], usual) = quartiles(times, 1);
+    let is_even = times.len() > FEWEST_INTERVALS && upper as f64 <= EVEN * lower.max(1) as f64;
+    let is_many = times.len() > 4 * FEWEST_INTERVALS;
+    // By a coarse clock, single intervals are long or short, and their sums are even.
+    let ([low, _, up], of_two) = quartiles(if is_many && !is_even { times } else { &[] }, 2);
+    let are_sums_even = low > 0 && up as f64 <= EVEN_OF_TWO * low as f64 && upper <= lower * 3;
     Some(Stretch {
         first,
         last,
         count: times.len() as u64,
-        period,
-        is_even: n >= FEWEST_INTERVALS && upper as f64 <= EVEN * lower.max(1) as f64,
+        period: match is_even {
+            true => usual,
+            false if are_sums_even => of_two / 2,
+            false => median,
+        },
+        is_even: is_even || are_sums_even,
         is_joined,
     })
+}
+
+/// The quartiles of the sums of so many intervals, and the usual sum: of intervals about as long as the median, and exactly the mean of
+/// all if each lasts for as many of these as were lost. 0 without intervals.
+fn quartiles(times: &[Stamp], many: usize) -> ([i64; 3], i64) {
+    let sums = times.iter().zip(times.iter().skip(many));
+    let mut sums: Vec<i64> = sums.map(|(a, b)| b.since(*a)).collect();
+    let many = sums.len();
+    if many == 0 {
+        return ([0; 3], 0);
+    }
+    let mut quartile = |part: usize| *sums.select_nth_unstable((many * part / 4).min(many - 1)).1;
+    let quartiles = [quartile(1), quartile(2), quartile(3)];
+    let median = quartiles[1];
+    let mean = |(sum, count): (i64, i64)| sum.checked_div(count).unwrap_or(median);
+    let near = sums
+        .iter()
+        .filter(|sum| (median / 2..=median / 2 * 3).contains(*sum));
+    let usual = mean(near.fold((0, 0), |all, sum| (all.0.saturating_add(*sum), all.1 + 1))).max(1);
+    let lasts = |sum: i64| sum.saturating_add(usual / 2) / usual;
+    let exact = mean(sums.iter().fold((0, 0), |all, sum| {
+        (all.0.saturating_add(*sum), all.1 + lasts(*sum))
+    }));
+    (quartiles, exact)
 }
 
 /// Joins neighbours whose rates have the same median.

@@ -65,7 +65,7 @@ fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
         let mut words = context.elements.nodes[node].seen.evidence.words();
         let mut others = sent[node].iter().filter(|other| **other != topic);
         // Every node publishes `/rosout`.
-        words.all(|word| ["connection", "rosout_rule"].contains(&word))
+        words.all(|word| ["connection", "links", "rosout_rule"].contains(&word))
             && others.all(|other| context.is_by_the_way(*other))
     };
     for hand in headlines(drafts, &[Kind::HandedOver]) {

@@ -9,11 +9,10 @@ use std::sync::Arc;
 use super::drafts::{Drafts, LogInput};
 use super::{Detail, Kind};
 use crate::base::rhythm::{
-    BACK_NS, BREAK, FEWEST_OF_SENDER, OVERLAP_NS, SHARE_HOLDS_NS, SHUTDOWN_NS, TAKEN_NS,
-    broken_after,
+    BACK_NS, BREAK, BREAK_NS, FEWEST_OF_SENDER, OVERLAP_NS, SHARE_HOLDS_NS, TAKEN_NS, broken_after,
 };
 use crate::base::time::Stamp;
-use crate::graph::history::{Bound, Sender, Stretch};
+use crate::graph::history::{Bound, Sender, Stretch, hide};
 use crate::graph::{Element, NodeId, TopicId};
 
 /// The most roles of a topic that take over from each other. Each is compared with all others, and a topic of a hundred
@@ -32,7 +31,7 @@ impl RoleSending {
     /// The longest time for which both send while one takes over from the other: a few messages.
     fn overlap(&self, new: &Self) -> i64 {
         let few = self.sent.period.max(new.sent.period).saturating_mul(BREAK);
-        few.clamp(SHUTDOWN_NS, OVERLAP_NS)
+        few.clamp(BREAK_NS, OVERLAP_NS)
     }
 }
 
@@ -66,12 +65,16 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
 /// The publishing intervals of each role, sorted by first message.
 fn sendings(context: &LogInput<'_>, senders: &[Sender]) -> Vec<RoleSending> {
     let mut all: Vec<RoleSending> = Vec::new();
+    let pauses = &context.history.pauses;
     for sender in senders {
         let Some(node) = sender.node else { continue };
         let mut own: Vec<RoleSending> = Vec::new();
         for stretch in &sender.stretches {
             match own.last_mut() {
-                Some(RoleSending { sent, .. }) if stretch.is_joined => {
+                // The end of a pause of the recorder is no beginning.
+                Some(RoleSending { sent, .. })
+                    if stretch.is_joined || hide(pauses, (sent.last, Some(stretch.first))) =>
+                {
                     (sent.last, sent.period) = (stretch.last, stretch.period);
                     sent.count += stretch.count;
                 }

@@ -9,6 +9,9 @@ use crate::base::rhythm::{FEWEST_OF_RATE, RATE_HOLDS_NS, RATE_PAUSE_NS};
 use crate::graph::Element;
 use crate::graph::history::{Bound, Sender, Stretch};
 
+/// The error of a rate as a fraction of it: a step from 8 to 10 Hz is not more than a quarter.
+const EXACT: f64 = 0.01;
+
 /// Adds all changes of rates.
 pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     let senders = context.history.sending.senders.iter();
@@ -20,11 +23,14 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
             {
                 continue;
             }
-            let width = before.period.max(after.period);
+            let factor = after.hz() / before.hz();
+            if context.history.simulation.explains(after.first, factor) {
+                continue;
+            }
             let at = Bound {
                 time: after.first,
-                earliest: before.last.min(after.first.plus(-width)),
-                latest: after.first.plus(width),
+                earliest: before.last.min(after.first.plus(-before.period)),
+                latest: after.first.plus(after.period),
             };
             let mut event = context.event(Kind::Rate, context.publication(sender), at);
             event.detail = Detail::Rates {
@@ -41,7 +47,8 @@ fn changes(before: &Stretch, after: &Stretch, share: f64) -> bool {
     let holds = |s: &Stretch| {
         s.is_even && s.count >= FEWEST_OF_RATE && s.last.since(s.first) >= RATE_HOLDS_NS
     };
-    let differs = (after.hz() - before.hz()).abs() > share * before.hz().min(after.hz());
+    let step = (after.hz() - before.hz()).abs() / before.hz().min(after.hz());
+    let differs = step > share + EXACT;
     let meets = after.is_joined || after.first.since(before.last) <= RATE_PAUSE_NS;
     holds(before) && holds(after) && differs && meets
 }

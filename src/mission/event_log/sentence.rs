@@ -29,9 +29,7 @@ pub(crate) fn sentence_with(mission: &Mission, parts: &[EventId], event: &Event)
 /// The sentence without the name of the element: `30 → 5 Hz`, `restarted, away for 6.8 s`.
 pub(crate) fn predicate(mission: &Mission, parts: &[EventId], event: &Event) -> String {
     let elements = &mission.elements;
-    // A node that is away for a nanosecond restarted at an unknown time before.
-    let until = event.until.filter(|until| until.since(event.time) > 1);
-    let lasted = until.map(|until| words::duration(until.since(event.time)));
+    let lasted = event.lasted().map(words::duration);
     match (&event.detail, event.kind) {
         (Detail::Rates { from_hz, to_hz }, _) => {
             let change = words::rate_change(*from_hz, *to_hz);
@@ -208,6 +206,12 @@ pub(crate) fn interrupted(one: &Interruption) -> String {
     match one.kind {
         InterruptionKind::ClockBack => format!("the recorder's clock went back by {length}"),
         InterruptionKind::Nothing => format!("nothing was recorded for {length}"),
+        InterruptionKind::SimulationBack => format!("simulated time went back by {length}"),
+        InterruptionKind::SimulationPaused => format!("simulation paused for {length}"),
+        InterruptionKind::SimulationSpeed => {
+            let speed = f64::from(one.percent) / 100.0;
+            format!("the simulation runs at {speed} of its speed for {length}")
+        }
     }
 }
 

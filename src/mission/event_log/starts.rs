@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 
 use super::drafts::{Drafts, LogInput};
 use super::{EventId, Kind};
-use crate::base::rhythm::TOGETHER_NS;
-use crate::base::time::Stamp;
+use crate::base::rhythm::{STEADY, STEADY_NS, TOGETHER_NS};
+use crate::base::time::{Span, Stamp};
 use crate::graph::history::{Bound, Life};
 use crate::graph::{Element, NodeId, TopicId};
 
@@ -40,9 +40,36 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
         for (kind, at) in limits(context.lives(what)) {
             let mut event = context.event(of_edge(kind), what, at);
             event.part_of = wholes.topics.get(&(id, kind, at.time)).copied();
+            event.quiet |= event.part_of.is_none() && is_by_chance(context, id, kind, at.time);
             drafts.add(event);
         }
     }
+}
+
+/// Whether a topic of unnamed publishers begins or ends without a rhythm that shows it: the last key that somebody presses.
+fn is_by_chance(context: &LogInput<'_>, topic: TopicId, kind: Kind, time: Stamp) -> bool {
+    let senders = context.history.sending.of_topic(topic);
+    let [sender] = senders else { return false };
+    let mut stretches = sender.stretches.chunk_by(|_, next| next.is_joined);
+    let run = stretches.find(|run| match kind {
+        Kind::Started => run[0].first == time,
+        _ => run[run.len() - 1].last == time,
+    });
+    let Some(run) = run.filter(|_| sender.node.is_none() && !sender.is_latched) else {
+        return false;
+    };
+    let span = Span::new(run[0].first, run[run.len() - 1].last);
+    let usual = run.iter().map(|s| s.period).max().unwrap_or(0);
+    let pauses = context
+        .history
+        .sending
+        .pauses
+        .get(topic)
+        .into_iter()
+        .flatten();
+    let mut inside = pauses.filter(|pause| span.start <= pause.start && pause.end <= span.end);
+    let count: u64 = run.iter().map(|s| s.count).sum();
+    count < STEADY || span.nanos() < STEADY_NS || inside.any(|pause| pause.nanos() > usual / 2 * 5)
 }
 
 /// The starts and stops of an element, in order.

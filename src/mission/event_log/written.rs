@@ -334,6 +334,9 @@ struct PeriodRow<'a> {
     name: Option<&'a str>,
     time_ns: Stamp,
     until_ns: Stamp,
+    /// The speed of a simulation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    percent: Option<u32>,
 }
 
 impl LogRow<'_> {
@@ -346,6 +349,7 @@ impl LogRow<'_> {
                 name: Some(&phase.name),
                 time_ns: phase.span.start,
                 until_ns: phase.span.end,
+                percent: None,
             }),
             Self::Interruption(one) => Some(PeriodRow {
                 kind: one.kind.word(),
@@ -353,9 +357,12 @@ impl LogRow<'_> {
                 name: None,
                 time_ns: one.time,
                 until_ns: match one.kind {
-                    InterruptionKind::ClockBack => one.time.plus(-one.length),
-                    InterruptionKind::Nothing => one.time.plus(one.length),
+                    InterruptionKind::ClockBack | InterruptionKind::SimulationBack => {
+                        one.time.plus(-one.length)
+                    }
+                    _ => one.time.plus(one.length),
                 },
+                percent: Some(one.percent).filter(|percent| *percent != 100),
             }),
             Self::Switch(_) | Self::Event(..) | Self::Part(..) => None,
         }
@@ -372,6 +379,7 @@ fn csv(mission: &Mission, bag: Option<&str>, rows: &[LogRow<'_>]) -> String {
             cells[3] = visible(one.name.unwrap_or_default()).into_owned();
             cells[5] = one.number.map_or_else(String::new, |n| n.to_string());
             cells[8] = one.until_ns.0.to_string();
+            cells[10] = one.percent.map_or_else(String::new, |n| n.to_string());
             cells
         }),
     });

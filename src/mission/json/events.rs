@@ -215,6 +215,17 @@ pub(crate) struct InterruptionRow<'a> {
     time_ns: Stamp,
     kind: Text<'a>,
     length_ns: i64,
+    #[serde(default = "usual", skip_serializing_if = "is_usual")]
+    percent: u32,
+}
+
+/// The speed, in percent, of everything but a simulation.
+fn usual() -> u32 {
+    100
+}
+
+fn is_usual(percent: &u32) -> bool {
+    *percent == usual()
 }
 
 impl From<&Interruption> for InterruptionRow<'_> {
@@ -223,6 +234,7 @@ impl From<&Interruption> for InterruptionRow<'_> {
             time_ns: one.time,
             kind: one.kind.word().into(),
             length_ns: one.length,
+            percent: one.percent,
         }
     }
 }
@@ -234,6 +246,7 @@ pub(crate) fn interruptions(rows: &[InterruptionRow<'_>]) -> Vec<Interruption> {
             time: row.time_ns,
             kind: InterruptionKind::from_word(&row.kind)?,
             length: row.length_ns.max(0),
+            percent: row.percent,
         })
     };
     let mut all: Vec<Interruption> = rows.iter().filter_map(one).collect();
