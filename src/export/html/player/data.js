@@ -17,6 +17,7 @@ async function unpacked({ type, textContent: text }) {
 const data = JSON.parse(await unpacked($.data));
 setText('data', '');
 const { words, starts, ends, reported, phases, rows, takeovers, sizes } = data;
+const isPhone = () => innerWidth <= 760;
 const W = starts.length, last = W - 1, total = Math.max(...ends.slice(-50), 1e-3);
 // The length of the lifelines: for two missions, whose windows have no times, that of the longer one.
 const long = data.sides ? Math.max(1e-3, ...rows.flatMap(([, , , lifetimes]) => lifetimes.filter((_, k) => k % 3 < 2))) : total;

@@ -40,7 +40,7 @@ function cells(i) {
 	const cell = (text, className = '') => make('td', { textContent: text, className });
 	const spark = make('td', { innerHTML: sparkline(rates), title: `${spell(mean(i))} Hz on average over the mission` });
 	return [
-		make('td', {}, shape(i), whole.kind(i)), make('td', {}, make('button', { textContent: whole.name(i), onclick: () => { table(false); pick(i, 1, 1); } })),
+		make('td', {}, shape(i), whole.kind(i)), make('td', {}, make('button', { textContent: whole.name(i), onclick: () => { table(false); pick(i, 1); } })),
 		cell(!away && whole.rate(i, ...range ?? [now]) || '–', 'n'),
 		cell(Math.abs(delta) < 1e-9 ? '' : (delta > 0 ? '+' : '−') + spell(Math.abs(delta)), 'n ' + (delta > 0 ? 'up' : 'down')),
 		spark, cell(first == Infinity ? '–' : clock(Math.floor(first)), 'n'), cell(end ? clock(Math.floor(end)) : '–', 'n'),
