@@ -137,7 +137,7 @@ fn the_page_in_a_browser_shows_the_mission() {
     let comparison = bag.path().join("comparison.html");
     let compared = Command::new(env!("CARGO_BIN_EXE_bagreel"))
         .arg("diff")
-        .args([examples.join("courier.mcap"), examples.join("courier")])
+        .args([examples.join("courier.mcap"), warehouse])
         .arg("-o")
         .arg(&comparison)
         .output()

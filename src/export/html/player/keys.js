@@ -52,7 +52,7 @@ onkeydown = e => {
 	press(key, shiftKey ? 10 : 1);
 };
 document.addEventListener('click', e => {
-	const key = e.target.closest?.('[data-key]')?.dataset.key, a = e.target.closest?.('a[href^="#"]');
+	const key = e.target.closest?.('button[data-key]')?.dataset.key, a = e.target.closest?.('a[href^="#"]');
 	if (key) press(key, 1);
 	// In a frame without its own address, a link would load the surrounding page.
 	if (a) {
