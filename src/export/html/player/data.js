@@ -113,14 +113,6 @@ class Graph {
 		const [x, y] = [from, to].map(w => this.lifecycle(i, w));
 		return x != y ? ['changed other', `${x || '?'} → ${y || '?'}`] : NONE;
 	}
-	// The windows in which it changes.
-	changesOf(i) {
-		const found = new Set(reported.filter(([, , , lines]) => lines.some(line => line[2] == i)).map(([w]) => w)), list = this.runs[i][0];
-		for (let r = 0; r < list.length; r += 2) {
-			if (this.marks[list[r + 1]] >= 0) for (let w = list[r]; w < Math.min(list[r + 2] ?? W, list[r] + 1000); w++) found.add(w);
-		}
-		return found;
-	}
 }
 const whole = new Graph(data.graphs[0], document.querySelector('#graph .items') && $.graph);
 const folded = data.graphs[1] && new Graph(data.graphs[1], $.folded);

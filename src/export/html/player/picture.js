@@ -177,11 +177,10 @@ function go(w) {
 }
 // Goes to a window for its changes, and brings them into view.
 const visit = w => { leave(); go(w); look(); };
-// To the next window with a headline; only of the followed element, if any.
+// To the next window with a headline.
 function jump(by) {
-	const turns = $.follow.ariaPressed == 'true' && sel >= 0 ? whole.changesOf(sel) : headlines;
 	let w = now;
-	do w += by; while (w >= 0 && w < W && !turns.has(w));
+	do w += by; while (w >= 0 && w < W && !headlines.has(w));
 	if (w >= 0 && w < W) visit(w);
 	else { play(0); setText('live', by > 0 ? 'No later change' : 'No earlier change'); }
 }

@@ -16,7 +16,6 @@ function pick(i, look, isTimed) {
 	if (i >= 0 && look && shown == folded && !nearOf(i).size) show(whole);
 	near = nearOf(i);
 	redraw();
-	if (i < 0) $.follow.ariaPressed = false;
 	card();
 	drawTime();
 	rowNames[rows.findIndex(([k]) => k >= 0 && k == i)]?.scrollIntoView({ block: 'nearest' });
@@ -102,7 +101,6 @@ function card() {
 	$.rate.toggleAttribute('hidden', !$.rate.childElementCount);
 	$.enlarge.hidden = $.rate.hasAttribute('hidden');
 	if (!$.big.hidden) enlarge(true);
-	$.follow.hidden = group >= 0;
 	$.unfold.hidden = group < 0;
 	setText('unfold', shown == whole ? 'Collapse' : 'Expand');
 	setText('endstitle', group < 0 ? 'Connected' : 'Members');
@@ -153,7 +151,6 @@ function enlarge(on) {
 }
 $.enlarge.onclick = () => enlarge(true);
 onSeek.push(card);
-$.follow.onclick = () => { $.follow.ariaPressed = $.follow.ariaPressed != 'true'; };
 
 // The element under the pointer.
 function hover(e, [title, ...lines]) {

@@ -32,7 +32,7 @@ function chosen() {
 	return edges.filter(i => {
 		const of = whole.kind(i).replace('topics', 'topic').replace('namespace', 'node');
 		const state = $.tstate.value;
-		return (kind ? of == kind : of != 'edge') && (!state || (state == 'here' ? isHere(i) : range ? /added|removed/.test(looksOf(whole)[i][0]) : base < 0 ? whole.marks[whole.class(i, now)] >= 0 || whole.rateChange(i, now) : whole.difference(i, base, now).length));
+		return (kind ? of == kind : of != 'edge') && (!state || (state == 'here' ? isHere(i) : !/^(away)?$/.test(signOf(i))));
 	});
 }
 function cells(i) {
