@@ -23,6 +23,7 @@ use crate::bag::Report;
 use crate::base::geometry::Rect;
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
+use crate::evidence::observation::LoggedText;
 use crate::graph::history::Sending;
 use crate::graph::{ById, Element, Elements, Graph, Graphs, TopicId};
 
@@ -78,6 +79,8 @@ pub struct Mission {
     /// Edges from source code that were not drawn, one per line; created when bags are read, not part of a mission's
     /// file.
     pub undrawn: Vec<String>,
+    /// The texts that nodes logged, sorted by time, each with the name of its node; also not part of a mission's file.
+    pub(crate) logged: Vec<LoggedText>,
 }
 
 /// The positions in a drawing, in pixels at scale 1, y down.

@@ -20,7 +20,7 @@ use crate::evidence::given::{NamedElement, Topology, TopologyEntry};
 use crate::evidence::inference::{
     Conclusions, ElementKey, Incident, IncidentKind, Inference, Stream, Validity, offers,
 };
-use crate::evidence::observation::{Measurement, Name};
+use crate::evidence::observation::{LoggedText, Measurement, Name};
 use crate::evidence::source::contract::Owners;
 use crate::evidence::source_id;
 use crate::evidence::times::Stamps;
@@ -63,6 +63,8 @@ pub struct Findings {
     pub notices: Notices,
     /// Edges that source code declares and that were not drawn, one per line.
     pub undrawn: Vec<String>,
+    /// The texts that nodes logged, sorted by time, each with the name of its node.
+    pub(crate) logged: Vec<LoggedText>,
 }
 
 impl Findings {
@@ -83,6 +85,7 @@ pub fn conclude(recorded: &Recorded, options: &ConcludeOptions) -> Result<Findin
 
 fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findings> {
     let (known, notices, undrawn) = concluded(recorded, options);
+    let logged = known.logged();
     if let Some(error) = known.failed {
         return Err(error);
     }
@@ -147,6 +150,7 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
         lines,
         notices,
         undrawn,
+        logged,
     })
 }
 

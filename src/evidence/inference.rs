@@ -11,7 +11,8 @@ use crate::base::rhythm::CLOSE_NS;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::message::log::is_ros1_log;
 use crate::evidence::observation::{
-    Confidence, EvidenceLine, Name, Observation, ObservationRecord, Observations, SourceId,
+    Confidence, EvidenceLine, LoggedText, Name, Observation, ObservationRecord, Observations,
+    SourceId,
 };
 use crate::evidence::times::SeriesId;
 use crate::evidence::{SOURCES, source_word};
@@ -355,6 +356,21 @@ impl<'a> Conclusions<'a> {
             above = &above[..above.rfind('/').unwrap_or(0)];
         }
         None
+    }
+
+    /// The texts of loggers that belong to a node, sorted by time, each with the name of its node; none if not all were kept,
+    /// since a node's last ones are asked for.
+    pub(crate) fn logged(&self) -> Vec<LoggedText> {
+        if self.facts.logged.is_cut() {
+            return Vec::new();
+        }
+        let (mut said, _) = self.facts.logged.sorted();
+        said.retain_mut(|text| {
+            let node = self.owner(&text.logger);
+            text.logger = node.map_or_else(|| "".into(), |node| self.text(node));
+            node.is_some()
+        });
+        said
     }
 
     /// Whether a node other than `node` names this topic as its own, as publisher or subscriber.

@@ -560,6 +560,11 @@ impl LoggedTexts {
         }
     }
 
+    /// Whether there were more log texts than are kept.
+    pub(crate) fn is_cut(&self) -> bool {
+        self.bytes[0] > MOST_TEXTS
+    }
+
     /// Drops those at other times than these.
     pub(crate) fn clip(&mut self, span: Span) {
         self.said.retain(|text| span.contains(text.time));

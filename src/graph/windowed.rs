@@ -14,6 +14,7 @@ use crate::evidence::Confidence;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
 use crate::evidence::observation::{Measurement, Name, age_of};
+use crate::graph::history::Sender;
 use crate::graph::history::records::{History, Record};
 use crate::graph::history::senders::sender;
 use crate::graph::{
@@ -48,6 +49,7 @@ pub(crate) fn graphs(
         windows: sorted,
         findings,
         history,
+        publishers: history.elements.wiring(|_, _| true).publishers,
         published: BTreeMap::new(),
         sent: Few::default(),
     };
@@ -78,6 +80,8 @@ struct GraphAssembly<'a> {
     windows: SortedWindows<'a>,
     findings: &'a Findings,
     history: &'a History,
+    /// The known publishers of each topic.
+    publishers: ById<TopicId, Vec<NodeId>>,
     /// The messages of each known publisher on each topic, in windows with any.
     published: BTreeMap<(Name, Name), Column>,
     /// The messages of each known publisher per window.
@@ -115,7 +119,7 @@ impl Sent {
     }
 }
 
-impl GraphAssembly<'_> {
+impl<'a> GraphAssembly<'a> {
     /// Counts messages, topic by topic.
     fn topics(&mut self, recorded: &Recorded) -> io::Result<()> {
         let history = self.history;
@@ -223,7 +227,10 @@ impl GraphAssembly<'_> {
         let what = Element::Topic(id);
         let mut list = sums.unwrap_or_default().iter().peekable();
         let own = |_: &Self, at| list.next_if(|sum| sum.window == at);
+        let senders = self.senders(id);
         self.element(what, own, |all, seen, sum| {
+            let lives = |life: Span| life.start < seen.window.end && seen.window.start < life.end;
+            let has_sender = senders.is_empty() || senders.iter().any(|s| s.spans().any(lives));
             let measures = all.measures.of(what, seen.at);
             let row = sum.map_or_else(
                 || Row {
@@ -234,13 +241,31 @@ impl GraphAssembly<'_> {
                 |sum| sum.row,
             );
             Row {
-                state: seen.record.state(seen.window, sum.is_some()),
+                state: match seen.record.state(seen.window, sum.is_some()) {
+                    State::Active if sum.is_none() && !has_sender => State::Silent,
+                    state => state,
+                },
                 confidence: seen.confidence,
                 drops: measures.drops,
                 age: Number::of(measures.age_s),
                 ..row
             }
         });
+    }
+
+    /// The publications of a topic, without which it is silent; none if it may have unknown publishers.
+    fn senders(&self, topic: TopicId) -> Vec<&'a Record> {
+        let history = self.history;
+        let is_unknown = |s: &Sender| s.node.is_none();
+        let known = history.elements.topics.get(topic);
+        if known.is_none_or(|t| t.unknown_publishers != Some(0))
+            && history.sending.of_topic(topic).iter().any(is_unknown)
+        {
+            return Vec::new();
+        }
+        let nodes = self.publishers.get(topic).into_iter().flatten();
+        let edges = nodes.filter_map(|node| history.elements.published((*node, topic)));
+        edges.filter_map(|edge| history.records.of(edge)).collect()
     }
 
     fn nodes(&mut self) {

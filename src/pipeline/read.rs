@@ -313,6 +313,7 @@ fn mission(
         log,
         sending: history.sending,
         undrawn: findings.undrawn.clone(),
+        logged: findings.logged.clone(),
         layout: None,
         notices,
     })

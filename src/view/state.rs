@@ -160,7 +160,10 @@ impl<'a> Now<'a> {
         if let (None, Some(row)) = (one.hz, self.row_of_sole(what)) {
             (one.hz, one.count) = (row.hz(self.span), row.count);
         }
-        if paused.is(what) {
+        // After its last publisher ended, a topic is silent even if its messages were rare.
+        let topic = self.mission.elements.ends(what).1;
+        let is_left = one.state == State::Silent && topic.is_some_and(|id| self.is_left(id));
+        if paused.is(what) || is_left {
             one.is_paused = true;
             one.state = one.state.max(State::Silent);
         }
@@ -197,13 +200,20 @@ impl<'a> Now<'a> {
         topic.filter(|_| !is_latched && first.is_some_and(|first| first >= self.span.end))
     }
 
+    /// Whether none of the known publishers of a topic exists.
+    fn is_left(&self, topic: TopicId) -> bool {
+        let is_alive = |id: &EdgeId| self.lives.0.is(Element::Publish(*id));
+        let senders = self.senders.get(topic);
+        senders.is_some_and(|all| !all.is_empty() && !all.iter().any(is_alive))
+    }
+
     /// The state of a topic before its first message: only subscribed to, if no publisher is known.
     fn state_of_waiting(&self, topic: TopicId) -> State {
-        let mut senders = self.senders.get(topic).into_iter().flatten();
-        if senders.any(|id| self.lives.0.is(Element::Publish(*id))) {
-            State::Silent
-        } else {
+        let is_unknown = self.senders.get(topic).is_none_or(Vec::is_empty);
+        if is_unknown || self.is_left(topic) {
             State::Declared
+        } else {
+            State::Silent
         }
     }
 

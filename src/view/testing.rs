@@ -35,6 +35,7 @@ pub(crate) fn mission(windows: &[&str]) -> Mission {
     let period = Period::from_nanos(SECOND).unwrap();
     let mut mission = Mission {
         undrawn: Vec::new(),
+        logged: Vec::new(),
         bags: Vec::new(),
         span: Span::new(span(0).start, span(windows.len()).start),
         messages: 0,

@@ -1,6 +1,7 @@
 """Tests that the page tells the mission truly and shows what it tells: the sentence, the list of all changes, its marks, and the
 view after "next change", on screens of three sizes."""
 
+import re
 import time
 
 from webdriver import Browser
@@ -88,12 +89,27 @@ def sentence(b, quiet):
     assert not shown, f"{shown} cannot be used without changes"
 
 
+SAVE = "const s = document.getElementById('save'); s.value = arguments[0]; s.dispatchEvent(new Event('change'))"
+
+
 def saved(b):
-    """A saved picture has the name and the sentence, and the policy of the page refuses none of it."""
+    """A saved picture has the name, the time, the sentence and the signs, and the policy of the page refuses none of it; a copied
+    link is confirmed."""
     b.log("browser")
-    b.js("HTMLAnchorElement.prototype.click = function () { window.got = decodeURIComponent(this.href); }; const s = document.getElementById('save'); s.value = 'svg'; s.dispatchEvent(new Event('change'))")
-    picture, name, sentence = b.js("return [window.got, document.querySelector('h1').textContent, document.getElementById('sentence').textContent]")
-    assert name in picture and sentence[:60] in picture and not b.log("browser"), picture[:200]
+    b.js("HTMLAnchorElement.prototype.click = function () { window.got = decodeURIComponent(this.href); }")
+    b.js(SAVE, "svg")
+    picture, *told = b.js("return [window.got, ...['h1', '#where'].map(css => document.querySelector(css).textContent), document.getElementById('sentence').textContent.slice(0, 60)]")
+    assert all(text in picture for text in told), (told, picture[:200])
+    sign = re.search('<use href="(#[a-z]+)"', picture)[1]
+    assert f'id="{sign[1:]}"' in picture, sign
+    b.js(SAVE, "png")
+    time.sleep(0.5)
+    assert b.js("return window.got").startswith("data:image/png") and not b.log("browser")
+    b.cdp("Browser.grantPermissions", permissions=["clipboardReadWrite", "clipboardSanitizedWrite"])
+    b.js("window.prompt = () => {}")
+    b.js(SAVE, "link")
+    time.sleep(0.2)
+    assert b.js("const tip = document.getElementById('tip'); return !tip.hidden && tip.getBoundingClientRect().width > 20 && tip.textContent.length > 5"), "copying a link is not confirmed"
 
 
 def changes(b, wide):

@@ -1,6 +1,7 @@
 """Tests the reader's choices in the page: a range of the timeline, namespaces, a plot, searches, embedding and printing."""
 
 import base64
+import re
 import time
 
 from webdriver import Browser
@@ -220,19 +221,27 @@ def embedded(b, url, topic_timeline):
     print("  #bare&loop shows the picture alone, again and again")
 
 
-def printed(b, url):
-    b.open("about:blank")
-    b.open(url)
-    paper = base64.b64decode(b.cdp("Page.printToPDF", printBackground=True)["data"])
-    assert paper.startswith(b"%PDF") and len(paper) > 20_000, len(paper)
-    b.cdp("Emulation.setEmulatedMedia", media="print")
-    b.js("dispatchEvent(new Event('beforeprint'))")
-    hidden, names = b.js("""const all = [...document.querySelectorAll('#graph .items > g:not(.off) > text:not(.r)')];
-        return [all.filter(t => getComputedStyle(t).visibility != 'visible').length, [...document.querySelectorAll('#rownames > *')].filter(r => r.getBoundingClientRect().height > 5).length]""")
-    assert hidden == 0 and names > 5, (hidden, names)
-    b.js("dispatchEvent(new Event('afterprint'))")
-    b.cdp("Emulation.setEmulatedMedia", media="")
-    print("  printed pages show all names and lifelines")
+def printed(b, *urls):
+    """A printed page is landscape and shows all names; each lifeline is a table row, so that its name stays beside it on any sheet."""
+    for url in urls:
+        b.open("about:blank")
+        b.open(url)
+        paper = base64.b64decode(b.cdp("Page.printToPDF", printBackground=True, preferCSSPageSize=True)["data"])
+        boxes = {tuple(float(n) for n in box.split()) for box in re.findall(rb"/MediaBox \[([^]]+)\]", paper)}
+        assert paper.startswith(b"%PDF") and len(paper) > 20_000 and boxes and all(w > h for _, _, w, h in boxes), (len(paper), boxes)
+        before = b.js("return [document.querySelector('.graph').getAttribute('viewBox'), document.getElementById('plot').getAttribute('height')]")
+        b.cdp("Emulation.setEmulatedMedia", media="print")
+        b.js("dispatchEvent(new Event('beforeprint'))")
+        hidden, lines = b.js("""const all = [...document.querySelectorAll('.graph:not([hidden]) .items > g:not(.off) > text:not(.r)')];
+            const lines = [...document.querySelectorAll('#printed tbody tr')].filter(tr => tr.querySelector('.lifetime, .inferred')?.getAttribute('d'));
+            return [all.filter(t => getComputedStyle(t).visibility != 'visible').length, lines.map(tr => [tr.cells[0].textContent, ...[...tr.cells].map(cell => cell.getBoundingClientRect().top),
+                tr.querySelector('svg').getBoundingClientRect().height, getComputedStyle(tr).breakInside])]""")
+        assert hidden == 0 and len(lines) > 5, (hidden, lines)
+        assert all(name and top == beside and high == 14 and split == "avoid" for name, top, beside, high, split in lines), lines
+        b.js("dispatchEvent(new Event('afterprint'))")
+        b.cdp("Emulation.setEmulatedMedia", media="")
+        assert before == b.js("return [document.querySelector('.graph').getAttribute('viewBox'), document.getElementById('plot').getAttribute('height')]"), "the screen is as before"
+    print("  printed pages are landscape and show all names and lifelines, a row each")
 
 
 def drive(b, url, topic_timeline, evolution):
@@ -249,4 +258,4 @@ def drive(b, url, topic_timeline, evolution):
 def check(url, topic_timeline, evolution):
     with Browser(1440, 900) as b:
         drive(b, url, topic_timeline, evolution)
-        printed(b, url)
+        printed(b, url, topic_timeline)

@@ -1,7 +1,8 @@
 """Drives a page in headless Chromium and Firefox: clicks, types, slides, and reads its text and the console.
 
-usage: drive.py PAGE.html EVOLUTION.json HOSTILE.html ANIMATION.svg FOLDED.html TOPIC_TIMELINE.html REPORT.md QUIET.html
-All but the hostile and the quiet page are of the evolution, whose every window is compared with the page.
+usage: drive.py PAGE.html EVOLUTION.json HOSTILE.html ANIMATION.svg FOLDED.html TOPIC_TIMELINE.html REPORT.md QUIET.html BAG.html COMPARISON.html
+The first page, the folded one and the timeline are of the evolution, whose every window is compared with the page; BAG.html is
+of examples/warehouse.bag.
 """
 
 import base64
@@ -18,6 +19,7 @@ import axe
 import choose
 import firefox
 import folded
+import habits
 import sight
 import changes
 import touch
@@ -175,7 +177,6 @@ def drive(b, url, evolution, data):
     assert topic in b.js("return document.getElementById('name').textContent")
     assert b.js("return document.querySelectorAll('#graph .near').length") > 1
     until(b, f"location.hash.includes('sel=topic:{topic}')")
-    assert b.js("return document.getElementById('lifeline').children.length") > 1
     b.keys(ESC, ESC)
     assert b.js("return document.getElementById('card').hidden && document.getElementById('hits').children.length == 0")
     node = windows[0]["nodes"][0]["name"]
@@ -394,7 +395,7 @@ def is_there(tool):
     return not reason
 
 
-def main(page, evolution, hostile_page, svg, folded_page, topic_timeline, report, quiet):
+def main(page, evolution, hostile_page, svg, folded_page, topic_timeline, report, quiet, bag, comparison):
     if not is_there(webdriver):
         return
     path = pathlib.Path(page).resolve()
@@ -412,6 +413,7 @@ def main(page, evolution, hostile_page, svg, folded_page, topic_timeline, report
     touch.check(url(page))
     sight.check(url(page), url(folded_page), url(topic_timeline))
     changes.check(url(page), url(topic_timeline), url(quiet), evolution, headlines(evolution))
+    habits.check(url(page), url(bag), url(comparison))
     if is_there(axe):
         axe.check(url(page), url(topic_timeline), report)
     if is_there(firefox):

@@ -61,6 +61,7 @@ def check(url):
         tap(b, "#graph .node:not(.off) :is(ellipse, rect)")
         name = b.js("return document.querySelector('#graph .node:not(.off)').dataset.name")
         assert b.js("return document.getElementById('name').textContent") == name
+        tap(b, "#card [data-key=Escape]")
         axis = b.js("const r = document.getElementById('marks').getBoundingClientRect(); return [r.left, r.top + r.height / 2, r.width]")
         drag(b, ((axis[0] + 5, axis[1]), (axis[0] + axis[2] - 5, axis[1])))
         last = b.js("return +document.getElementById('seek').max")

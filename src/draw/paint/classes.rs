@@ -3,10 +3,12 @@
 
 mod css;
 
+use std::fmt::Write as _;
+
 pub(crate) use css::{rules, variables};
 
 use crate::base::geometry::Point;
-use crate::draw::paint::xml::{Xml, units};
+use crate::draw::paint::xml::{Xml, tenth, units};
 use crate::draw::picture::{Union, UnionElement};
 use crate::draw::scene::{Form, Group, Piece, Step};
 use crate::draw::style::Style;
@@ -142,7 +144,7 @@ impl Classes<'_> {
                     .attribute("ry", tenth(r.h / 2.0));
             }
             Form::Path(steps) => {
-                xml.attribute("d", path(steps, 10));
+                xml.attribute("d", path(steps));
             }
         }
         xml.close_empty();
@@ -170,127 +172,54 @@ fn whole(value: f64) -> i64 {
     units(value, 1)
 }
 
-fn tenth(value: f64) -> String {
-    decimal(units(value, 10), 10)
-}
-
-/// `units` of 1/`parts` (1 or 10) as a decimal without a needless zero.
-fn decimal(units: i64, parts: i64) -> String {
-    let sign = if units < 0 { "-" } else { "" };
-    let (whole, rest) = (units.abs() / parts, units.abs() % parts);
-    match (whole, rest) {
-        (whole, 0) => format!("{}{whole}", if whole == 0 { "" } else { sign }),
-        (0, rest) => format!("{sign}.{rest}"),
-        (whole, rest) => format!("{sign}{whole}.{rest}"),
-    }
-}
-
-/// The shortest path data: steps from point to point, lines where a curve is straight.
-fn path(steps: &[Step], parts: i64) -> String {
-    let mut pen = ClassPen {
-        out: String::new(),
-        here: (0, 0),
-        parts,
-        last: ' ',
-    };
+/// Short path data: steps from point to point in tenths, lines where a curve is straight.
+fn path(steps: &[Step]) -> String {
+    let mut out = String::new();
+    let mut here = Point::new(0.0, 0.0);
     for step in steps {
-        match step {
-            Step::Move(p) => {
-                let (x, y) = pen.grid(*p);
-                pen.letter('M');
-                pen.numbers(&[x, y]);
-                pen.here = (x, y);
+        let (letter, points): (_, &[Point]) = match step {
+            Step::Move(to) => ('M', std::slice::from_ref(to)),
+            Step::Line(to) => ('l', std::slice::from_ref(to)),
+            Step::Curve([a, b, to]) if is_straight(here, [*a, *b], *to) => {
+                ('l', std::slice::from_ref(to))
             }
-            Step::Line(p) => pen.line(*p),
-            Step::Curve([a, b, end]) => {
-                if pen.is_straight(*a, *b, *end) {
-                    pen.line(*end);
-                } else {
-                    pen.curve([*a, *b, *end]);
-                }
-            }
-            Step::Close => {
-                pen.out.push('z');
-                pen.last = 'z';
-            }
-        }
-    }
-    pen.out
-}
-
-struct ClassPen {
-    out: String,
-    /// The end of the last step, in units.
-    here: (i64, i64),
-    parts: i64,
-    last: char,
-}
-
-impl ClassPen {
-    fn grid(&self, p: Point) -> (i64, i64) {
-        (units(p.x, self.parts), units(p.y, self.parts))
-    }
-
-    /// Writes the command, unless the previous one was the same and continues.
-    fn letter(&mut self, letter: char) {
-        if self.last != letter || letter == 'M' {
-            self.out.push(letter);
-            self.last = letter;
+            Step::Curve(points) => ('c', points),
+            Step::Close => ('z', &[]),
+        };
+        let from = if letter == 'M' {
+            Point::new(0.0, 0.0)
         } else {
-            self.last = '+';
-        }
-    }
-
-    fn numbers(&mut self, numbers: &[i64]) {
-        let repeated = self.last == '+';
-        for (at, number) in numbers.iter().enumerate() {
-            let text = decimal(*number, self.parts);
-            if (at > 0 || repeated) && !text.starts_with('-') {
-                self.out.push(' ');
+            here
+        };
+        out.push(letter);
+        for (at, p) in points.iter().enumerate() {
+            // Rounded places, not rounded steps, so that errors do not add up.
+            here = Point::new(units(p.x, 10) as f64 / 10.0, units(p.y, 10) as f64 / 10.0);
+            for (axis, step) in [here.x - from.x, here.y - from.y].into_iter().enumerate() {
+                let text = tenth(step).to_string();
+                let is_first = at + axis == 0;
+                let gap = if is_first || text.starts_with('-') {
+                    ""
+                } else {
+                    " "
+                };
+                let _ = write!(out, "{gap}{text}");
             }
-            self.out.push_str(&text);
         }
     }
+    out
+}
 
-    fn go(&mut self, letter: char, numbers: &[i64], to: (i64, i64)) {
-        self.letter(letter);
-        self.numbers(numbers);
-        self.last = letter;
-        self.here = to;
-    }
-
-    fn line(&mut self, p: Point) {
-        let to = self.grid(p);
-        match (to.0 - self.here.0, to.1 - self.here.1) {
-            (0, 0) => {}
-            (dx, 0) => self.go('h', &[dx], to),
-            (0, dy) => self.go('v', &[dy], to),
-            (dx, dy) => self.go('l', &[dx, dy], to),
-        }
-    }
-
-    fn curve(&mut self, points: [Point; 3]) {
-        let places = points.map(|p| self.grid(p));
-        let steps: Vec<i64> = places
-            .iter()
-            .flat_map(|p| [p.0 - self.here.0, p.1 - self.here.1])
-            .collect();
-        self.go('c', &steps, places[2]);
-    }
-
-    /// Whether both controls lie within half a pixel of the line to the end, and between its ends.
-    fn is_straight(&self, a: Point, b: Point, end: Point) -> bool {
-        let parts = self.parts as f64;
-        let from = Point::new(self.here.0 as f64 / parts, self.here.1 as f64 / parts);
-        let (dx, dy) = (end.x - from.x, end.y - from.y);
-        let length = libm::hypot(dx, dy).max(1e-9);
-        [a, b].iter().all(|p| {
-            let (x, y) = (p.x - from.x, p.y - from.y);
-            let along = (x * dx + y * dy) / length;
-            let aside = (x * dy - y * dx) / length;
-            aside.abs() <= 0.5 && (-0.5..=length + 0.5).contains(&along)
-        })
-    }
+/// Whether both controls of a curve lie within half a pixel of the line to its end, and between its ends.
+fn is_straight(from: Point, controls: [Point; 2], end: Point) -> bool {
+    let (dx, dy) = (end.x - from.x, end.y - from.y);
+    let length = libm::hypot(dx, dy).max(1e-9);
+    controls.iter().all(|p| {
+        let (x, y) = (p.x - from.x, p.y - from.y);
+        let along = (x * dx + y * dy) / length;
+        let aside = (x * dy - y * dx) / length;
+        aside.abs() <= 0.5 && (-0.5..=length + 0.5).contains(&along)
+    })
 }
 
 #[cfg(test)]
@@ -309,16 +238,7 @@ mod tests {
             Step::Curve([p(40.0, 20.0), p(40.0, 50.0), p(60.0, 50.0)]),
             Step::Curve([p(70.0, 50.0), p(70.0, 20.0), p(90.0, 20.0)]),
         ];
-        assert_eq!(
-            path(&steps, 1),
-            "M10 20h20c10 0 10 30 30 30 10 0 10-30 30-30"
-        );
-        assert_eq!(path(&steps[..2], 10), "M10 20h20");
-    }
-
-    #[test]
-    fn decimals_have_no_trailing_zeros() {
-        let all = [-3.04, -0.25, 0.04, 0.5, 12.0, f64::NAN].map(tenth);
-        assert_eq!(all, ["-3", "-.3", "0", ".5", "12", "0"]);
+        let data = "M10 20l20 0c10 0 10 30 30 30c10 0 10-30 30-30";
+        assert_eq!(path(&steps), data);
     }
 }

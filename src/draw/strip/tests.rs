@@ -25,6 +25,7 @@ fn two_nodes() -> (Mission, View) {
         log: crate::mission::EventLog::default(),
         sending: crate::graph::history::Sending::default(),
         undrawn: Vec::new(),
+        logged: Vec::new(),
         layout: None,
         notices: Notices::new(),
     };

@@ -1,18 +1,17 @@
 //! The changes that a page lists, read from the event log: per window for the script, and as a table for readers without
 //! scripts, for printing, and for links into the mission.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
 use super::{HtmlPage, PageGraph};
-use crate::base::time::{Span, Stamp};
+use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
 use crate::draw::paint::xml::Xml;
 use crate::draw::picture::change_counts;
 use crate::draw::picture::title::SIDES;
 use crate::draw::timeline::Timeline;
-use crate::draw::timeline::marks::RowMark;
 use crate::graph::Element;
 use crate::mission::EventId;
 use crate::mission::event_log::{Event, Kind, LogFormat, LogLine, LogRow, row_lines};
@@ -137,25 +136,14 @@ impl PageChanges {
             )
         });
         let windows: Vec<ChangedWindow> = windows.collect();
-        // The list has every mark: a part of an event is marked only if the event is listed in the same window.
-        let mut listed: BTreeMap<EventId, Vec<Span>> = BTreeMap::new();
-        for window in &windows {
-            for line in &window.3 {
-                listed
-                    .entry(line.4)
-                    .or_default()
-                    .push(view.frames[window.0].span);
-            }
-        }
+        // The list has every mark: a part of an event is marked only if the event is listed.
+        let listed = windows.iter().flat_map(|w| w.3.iter().map(|line| line.4));
+        let listed: BTreeSet<EventId> = listed.collect();
         let whole = |id| mission.log.events.get(id).and_then(|event| event.part_of);
-        let is_listed = |mark: &RowMark, id: EventId| {
-            let spans = listed.get(&whole(id).unwrap_or(id));
-            view.compares || spans.is_some_and(|all| all.iter().any(|s| s.contains(mark.at)))
-        };
+        let is_listed = |id: &EventId| view.compares || listed.contains(&whole(*id).unwrap_or(*id));
         let mut lives = page.sequence.unfolded.and_then(|u| u.lives).cloned();
         for row in lives.iter_mut().flat_map(|lives| &mut lives.rows) {
-            let is_marked = |mark: &RowMark| mark.events.iter().any(|id| is_listed(mark, *id));
-            row.marks.retain(is_marked);
+            row.marks.retain(|mark| mark.events.iter().any(is_listed));
         }
         Self {
             windows,

@@ -5,12 +5,13 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::changes::{ChangedWindow, PageChanges, PageClock};
-use super::element_runs::ElementRuns;
+use super::element_runs::{ElementRuns, ValueTable};
 use super::{HtmlPage, PageGraph};
 use crate::base::cast;
 use crate::base::digest;
 use crate::base::geometry::Rect;
-use crate::base::time::Stamp;
+use crate::base::name::is_log;
+use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::base::words::visible;
 use crate::draw::picture::title::SIDES;
@@ -18,7 +19,8 @@ use crate::draw::timeline::Timeline;
 use crate::draw::timeline::marks::{RowMark, Sign};
 use crate::draw::timeline::rows::{Level, Row};
 use crate::evidence::Evidence;
-use crate::graph::{Element, Elements, Id as _};
+use crate::graph::history::Sender;
+use crate::graph::{Element, Elements, Id as _, Node, NodeId};
 use crate::mission::info::is_ros1;
 use crate::mission::{EventId, Mission};
 use crate::view::{Arrow, ArrowKind, Item};
@@ -50,6 +52,8 @@ struct PageData<'a> {
     rows: Vec<RowData>,
     /// Takeovers: the time, the old row, the new row, and the event's index in the log.
     takeovers: Vec<(f64, usize, usize, EventId)>,
+    /// The lifetimes of each node, by its element.
+    lives: Vec<(u32, Vec<LastSigns>)>,
     /// Font sizes: of rates, topics' names, nodes' names, namespaces' titles.
     sizes: [f64; 4],
     /// The titles of the two windows of a comparison; absent otherwise.
@@ -91,13 +95,18 @@ struct GraphData<'a> {
 #[derive(Serialize)]
 struct RowData(i64, String, u8, Vec<f64>, Vec<f64>, Vec<(f64, u8, EventId)>);
 
+/// A lifetime of a node: its start and its end, its last message as time and topic, and the last texts that it logged, each
+/// with its time.
+#[derive(Serialize)]
+struct LastSigns(f64, f64, Option<(f64, String)>, Vec<(f64, String)>);
+
 /// The data as JSON that is safe between the tags of a page.
 pub(super) fn json(page: &HtmlPage<'_>, still: usize, changes: &PageChanges) -> String {
     let whole = &page.whole;
     let mission = page.sequence.mission;
     let frames = &whole.view.frames;
     let (clock, places) = (changes.clock, &changes.places);
-    let mut words = Words::default();
+    let mut words = ValueTable::default();
     let mut graphs = vec![graph(page, whole, places, clock, &mut words)];
     graphs.extend(
         page.folded
@@ -108,7 +117,7 @@ pub(super) fn json(page: &HtmlPage<'_>, still: usize, changes: &PageChanges) -> 
     let lives = changes.lives.as_ref();
     let data = PageData {
         graphs,
-        words: words.list,
+        words: words.list(Clone::clone),
         starts: frames.iter().map(|f| clock.secs(f.span.start)).collect(),
         ends: frames.iter().map(|f| clock.secs(f.span.end)).collect(),
         epoch: clock.0.0.div_euclid(1_000_000),
@@ -116,6 +125,7 @@ pub(super) fn json(page: &HtmlPage<'_>, still: usize, changes: &PageChanges) -> 
         phases: phases(mission, clock),
         rows: lives.map_or_else(Vec::new, |lives| rows(lives, changes)),
         takeovers: lives.map_or_else(Vec::new, |lives| takeovers(lives, clock)),
+        lives: last_signs(mission, changes),
         sizes: [
             style.edge.size.min(style.topic.small).min(style.node.small),
             style.topic.size,
@@ -140,7 +150,7 @@ fn graph<'a>(
     drawn: &'a PageGraph<'_>,
     places: &BTreeMap<Element, u32>,
     clock: PageClock,
-    words: &mut Words,
+    words: &mut ValueTable<String>,
 ) -> GraphData<'a> {
     let (view, runs) = (drawn.view, &drawn.runs);
     let order = || drawn.order.iter().map(|id| &view.arrows[*id]);
@@ -246,6 +256,34 @@ fn takeovers(timeline: &Timeline, clock: PageClock) -> Vec<(f64, usize, usize, E
     marks.filter_map(takeover).collect()
 }
 
+/// The most texts of a lifetime: they are read in a card beside the graph.
+const MOST_TEXTS: usize = 3;
+
+fn last_signs(mission: &Mission, changes: &PageChanges) -> Vec<(u32, Vec<LastSigns>)> {
+    let (elements, clock) = (&mission.elements, changes.clock);
+    let topic = |id| elements.topics.get(id).map_or("", |t| t.name.as_str());
+    let of = |(id, node): (NodeId, &Node)| {
+        let life = |life: &Span| {
+            let last = |sender: &Sender| {
+                let mut own = sender.stretches.iter().rev();
+                let last = own.find(|s| life.contains(s.first))?.last;
+                Some((clock.secs(last), visible(topic(sender.topic)).into_owned()))
+            };
+            let own = mission.sending.senders.iter();
+            let own = own.filter(|s| s.node == Some(id) && !is_log(topic(s.topic)));
+            let last = own.filter_map(last).max_by(|a, b| a.0.total_cmp(&b.0));
+            let texts = mission.logged.iter().rev();
+            let texts = texts.filter(|t| &*t.logger == node.name.as_str() && life.contains(t.time));
+            let texts = texts.map(|t| (clock.secs(t.time), visible(&t.text).into_owned()));
+            let (start, end) = (clock.secs(life.start), clock.secs(life.end));
+            LastSigns(start, end, last, texts.take(MOST_TEXTS).collect())
+        };
+        let place = changes.places.get(&Element::Node(id))?;
+        Some((*place, node.seen.lives.iter().map(life).collect()))
+    };
+    elements.nodes.with_ids().filter_map(of).collect()
+}
+
 /// The text for the page and its type.
 pub(super) fn packed(json: &str) -> (String, &'static str) {
     if json.len() < LONG {
@@ -264,25 +302,6 @@ fn rounded(rect: Rect) -> [i64; 4] {
     [whole(rect.x), whole(rect.y), whole(rect.w), whole(rect.h)]
 }
 
-/// A table of unique sentences.
-#[derive(Default)]
-struct Words {
-    list: Vec<String>,
-    places: BTreeMap<String, u32>,
-}
-
-impl Words {
-    fn place(&mut self, text: String) -> u32 {
-        if let Some(place) = self.places.get(&text) {
-            return *place;
-        }
-        let place = u32::try_from(self.list.len()).unwrap_or(u32::MAX);
-        self.list.push(text.clone());
-        self.places.insert(text, place);
-        place
-    }
-}
-
 /// The most members that are listed; the rest is counted.
 const MOST_MEMBERS: usize = 12;
 
@@ -291,7 +310,7 @@ fn facts_of(
     members: &[Element],
     clock: PageClock,
     is_item: bool,
-    words: &mut Words,
+    words: &mut ValueTable<String>,
 ) -> Vec<u32> {
     let elements = &page.sequence.mission.elements;
     let mut facts = Vec::new();

@@ -132,7 +132,8 @@ impl LookClass {
 }
 
 /// Distinct values in order of appearance.
-struct ValueTable<T> {
+#[derive(Default)]
+pub(super) struct ValueTable<T> {
     places: BTreeMap<T, u32>,
 }
 
@@ -143,12 +144,12 @@ impl<T: Ord + Clone> ValueTable<T> {
         }
     }
 
-    fn place(&mut self, value: T) -> u32 {
+    pub(super) fn place(&mut self, value: T) -> u32 {
         let next = u32::try_from(self.places.len()).unwrap_or(u32::MAX);
         *self.places.entry(value).or_insert(next)
     }
 
-    fn list(&self, write: impl Fn(&T) -> String) -> Vec<String> {
+    pub(super) fn list(&self, write: impl Fn(&T) -> String) -> Vec<String> {
         let mut out = vec![String::new(); self.places.len()];
         for (value, place) in &self.places {
             out[*place as usize] = write(value);

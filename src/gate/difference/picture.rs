@@ -176,6 +176,7 @@ pub(crate) fn union(
         graphs,
         sending: Sending::default(),
         undrawn: Vec::new(),
+        logged: Vec::new(),
         layout: None,
         notices: Notices::new(),
     }

@@ -112,6 +112,7 @@ fn mission_of(mut raw: Raw) -> Result<Mission, String> {
         windows,
         log: EventLog::default(),
         undrawn: Vec::new(),
+        logged: Vec::new(),
         layout: raw.layout,
         notices: notices(raw.notices),
     };

@@ -70,6 +70,7 @@ fn mission(graphs: Vec<(Graph, i64)>) -> Mission {
         log: EventLog::default(),
         sending: Sending::default(),
         undrawn: Vec::new(),
+        logged: Vec::new(),
         layout: None,
         notices: Notices::new(),
     }

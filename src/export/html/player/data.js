@@ -17,6 +17,7 @@ async function unpacked({ type, textContent: text }) {
 const data = JSON.parse(await unpacked($.data));
 setText('data', '');
 const { words, starts, ends, reported, phases, rows, takeovers, sizes } = data;
+const isPhone = () => innerWidth <= 760;
 const W = starts.length, last = W - 1, total = Math.max(...ends.slice(-50), 1e-3);
 // The length of the lifelines: for two missions, whose windows have no times, that of the longer one.
 const long = data.sides ? Math.max(1e-3, ...rows.flatMap(([, , , lifetimes]) => lifetimes.filter((_, k) => k % 3 < 2))) : total;
@@ -111,14 +112,6 @@ class Graph {
 		if (Math.abs(after - before) > data.change * (before || after) * (1 + 1e-9)) return [after > before ? 'changed faster' : 'changed slower', change];
 		const [x, y] = [from, to].map(w => this.lifecycle(i, w));
 		return x != y ? ['changed other', `${x || '?'} → ${y || '?'}`] : NONE;
-	}
-	// The windows in which it changes.
-	changesOf(i) {
-		const found = new Set(reported.filter(([, , , lines]) => lines.some(line => line[2] == i)).map(([w]) => w)), list = this.runs[i][0];
-		for (let r = 0; r < list.length; r += 2) {
-			if (this.marks[list[r + 1]] >= 0) for (let w = list[r]; w < Math.min(list[r + 2] ?? W, list[r] + 1000); w++) found.add(w);
-		}
-		return found;
 	}
 }
 const whole = new Graph(data.graphs[0], document.querySelector('#graph .items') && $.graph);

@@ -16,14 +16,15 @@ function escape() {
 	if ($.q.value) return clearSearch();
 	if (sel >= 0 || !$.card.hidden) { restore(); return pick(-1); }
 	if (range) { span(null); return seek(now); }
-	if (base >= 0) compare(-1);
+	if (base >= 0) return compare(-1);
+	showTime(0, long);
 }
 // Panel and lifelines are shown if there is space, until the user chooses.
 let isChosen = false;
 function arrange() {
 	if (isChosen || beforePrint) return;
-	side(innerWidth >= 1200 || innerWidth <= 760);
-	showLifelines(isTopicTimeline || innerWidth > 760 && innerHeight > 600);
+	side(innerWidth >= 1200 || isPhone());
+	showLifelines(isTopicTimeline || !isPhone() && innerHeight > 600);
 }
 const choose = (arranges, on) => { isChosen = true; arranges(on); };
 const MOVES = { ArrowRight: 1, ArrowLeft: -1, '.': 1, ',': -1, PageDown: W / 10, PageUp: -W / 10, Home: -W, End: W };
@@ -32,7 +33,7 @@ const KEYS = {
 	'+': () => zoom(1.25), '=': () => zoom(1.25), '-': () => zoom(.8), f: () => fit(homeOf()), z: () => bring([...near]), c: () => bring(marked()),
 	'/': () => { choose(side, true); $.q.focus(); $.q.select(); }, '?': () => $.help.showModal(), Escape: escape,
 	g: () => enlarge($.big.hidden), r: () => { if (data.sides) return; if (range) { span(null); seek(now); } else { anchor = now; go(now); } },
-	b: () => compare(base < 0 ? now : -1), t: () => table($.sheet.hidden), l: () => choose(showLifelines, $.controls.classList.contains('small')), s: () => choose(side, !sideIsOpen()),
+	b: () => compare(base < 0 ? now : -1), t: () => table($.sheet.hidden), l: () => choose(showLifelines, $.controls.classList.contains('small')), i: () => choose(side, !sideIsOpen()), w: () => zoomTime(.7), s: () => zoomTime(1.4),
 	o: () => { if (group >= 0) unfold(); else if (folded) { show(shown == folded ? whole : folded); search(); firstView(); } },
 };
 const press = (key, far) => KEYS[key] ? KEYS[key]() : go(MOVES[key] ? now + Math.sign(MOVES[key]) * Math.ceil(Math.abs(MOVES[key] * far)) : Math.round(last * key / 10));
@@ -51,13 +52,13 @@ onkeydown = e => {
 	press(key, shiftKey ? 10 : 1);
 };
 document.addEventListener('click', e => {
-	const key = e.target.closest?.('[data-key]')?.dataset.key, a = e.target.closest?.('a[href^="#"]');
+	const key = e.target.closest?.('button[data-key]')?.dataset.key, a = e.target.closest?.('a[href^="#"]');
 	if (key) press(key, 1);
 	// In a frame without its own address, a link would load the surrounding page.
 	if (a) {
 		e.preventDefault();
 		visit(windowAt(parseFloat(a.hash.slice(3))));
-		if (innerWidth <= 760) stage.scrollIntoView({ block: 'start' });
+		if (isPhone()) stage.scrollIntoView({ block: 'start' });
 	}
 });
 // Until the user changes the view, it is adapted to every new size of the stage.
@@ -75,21 +76,29 @@ addEventListener('resize', arrange);
 arrange();
 // Printed pages show the whole graph, with names and lifelines, regardless of the screen.
 onbeforeprint = () => {
-	beforePrint = [view, $.controls.classList.contains('small'), $.notes.open];
+	beforePrint = [view, $.notes.open];
 	$.notes.open = true;
 	if (!isTopicTimeline) fit(homeOf());
 	svg().classList.remove('norates', 'notopics', 'nonodes');
-	$.controls.classList.remove('small');
-	$.time.style.width = '42rem';
-	drawTime();
-	// On one sheet, so that names and lifelines stay side by side.
-	$.time.style.zoom = Math.max(.4, Math.min(1, 600 / $.time.offsetHeight));
+	document.body.classList.add('paper');
+	showTime(0, long);
+	[rowHeight, isFolded] = [14, false];
+	// One table row each, so that no page break separates a name from its lifeline.
+	const w = $.axis.clientWidth, line = (name, className, ...inside) => make('tr', { className }, make('td', { textContent: name }), make('td', {}, ...inside));
+	$.printed.replaceChildren(make('thead', {}, line('', '', $.ticks.cloneNode(true))), make('tbody', {}, ...rows.map((row, r) => {
+		if (isRowOut(row, r)) return '';
+		const [d, marks] = pathsOf(row, 7, s => part(s) * w), own = set(drawn('svg', {}), { class: 'plot', width: w, height: 14 });
+		own.append(...Object.entries(d).map(([key, d]) => drawn('path', { class: key, d })), ...marks);
+		return line(row[1], row[0] < 0 && !row[2] ? 'space' : '', own);
+	})));
 };
 onafterprint = () => {
-	const [box, isSmall, isOpen] = beforePrint;
+	const [box, isOpen] = beforePrint;
 	$.notes.open = isOpen;
-	beforePrint = $.time.style.width = $.time.style.zoom = '';
-	showLifelines(!isSmall);
+	beforePrint = null;
+	$.printed.replaceChildren();
+	document.body.classList.remove('paper');
+	resized();
 	fit(box);
 };
 load(location.hash.slice(1));

@@ -5,7 +5,7 @@ const shape = i => make('i', { className: i < 0 ? '' : 'is-' + whole.kind(i) });
 // A button that selects an element, with a text about it.
 const entry = (i, text, sign = '', time = '') => make('button', {
 	className: sign, title: i < 0 ? text : whole.name(i),
-	onclick: () => pick(i, 1, 1),
+	onclick: () => pick(i, 1),
 }, shape(i), make('span', {}, time && make('b', { textContent: time + ' ' }), text));
 function fill(id, all, row, most = MANY) {
 	const list = $[id], kept = list.contains(document.activeElement);

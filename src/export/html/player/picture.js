@@ -4,6 +4,8 @@ let now = 0, base = -1, shown = folded ?? whole, sel = -1, timer = 0, hits = nul
 let near = new Set(), rings = new Set(), only = false, looping = false;
 // A range of windows shown as one: its ends, the window at which it began, and its looks, per graph.
 let range = null, anchor = -1, rangeLooks = new Map();
+// The range that is played again and again.
+let played = null;
 // Namespaces that the user hid.
 const without = new Set();
 const spaceOf = name => name.startsWith('/') && name.indexOf('/', 1) > 0 ? name.slice(0, name.indexOf('/', 1)) : '/';
@@ -118,14 +120,54 @@ function header() {
 	$.seek.value = now;
 	$.seek.ariaValueText = [clock(starts[now]), place, ...counts.filter(Boolean)].join(', ');
 }
+// Multiples of real time, from a window in ten seconds to sixty in a second, about two windows in a second first; and a
+// window with changes every second.
+const speeds = [...Array(21).keys()].map(k => [1, 2, 5][k % 3] * 10 ** Math.floor(k / 3)).filter(by => by * W / total <= 60 && by * W / total >= .1);
+$.speed.append(...[...speeds, 0].map(by => make('option', { value: by, textContent: by ? by + ' ×' : 'changes' })));
+$.speed.value = speeds.findLast(by => by * W / total < 2.6) ?? speeds[0] ?? 0;
+// Plays the mission, or the range again and again.
 function play(on) {
 	if (!on && !timer) return;
-	clearTimeout(timer);
-	if (on) span(null);
-	timer = on && setTimeout(() => { seek(now == last && looping ? 0 : now + 1, 1); play(looping || now < last); }, 1e3 / $.speed.value);
+	cancelAnimationFrame(timer);
+	timer = 0;
 	setText('play', on ? 'Pause' : 'Play');
-	if (on && now == last) seek(0, 1);
-	if (!on) save();
+	if (!on) {
+		if (played) span(played);
+		$.passed.hidden = true;
+		played = null;
+		seek(now, 1);
+		return save();
+	}
+	played = range;
+	span(null);
+	const [first, end] = played ?? [0, last];
+	if (played) lay($.passed, starts[first], ends[end]);
+	$.passed.hidden = !played;
+	if (played || now == last) seek(first, 1);
+	let before, s = starts[now];
+	const step = t => {
+		const speed = +$.speed.value, gone = (t - (before ??= t)) / 1e3;
+		let w = now;
+		if (speed) {
+			s += Math.min(gone, .5) * speed;
+			before = t;
+			w = s < ends[end] ? Math.max(now, windowAt(s)) : end + 1;
+		} else if (gone >= 1) {
+			before = t;
+			do w++; while (w <= end && !headlines.has(w));
+		}
+		if (w > end) {
+			if (!played && !looping) return play(0);
+			w = first;
+		}
+		if (w != now) {
+			if (w == first || !speed) s = starts[w];
+			seek(w, 1);
+			if (!speed) look();
+		}
+		timer = requestAnimationFrame(step);
+	};
+	timer = requestAnimationFrame(step);
 }
 function go(w) {
 	play(0);
@@ -134,12 +176,11 @@ function go(w) {
 	seek(w);
 }
 // Goes to a window for its changes, and brings them into view.
-const visit = w => { go(w); look(); };
-// To the next window with a headline; only of the followed element, if any.
+const visit = w => { leave(); go(w); look(); };
+// To the next window with a headline.
 function jump(by) {
-	const turns = $.follow.ariaPressed == 'true' && sel >= 0 ? whole.changesOf(sel) : headlines;
 	let w = now;
-	do w += by; while (w >= 0 && w < W && !turns.has(w));
+	do w += by; while (w >= 0 && w < W && !headlines.has(w));
 	if (w >= 0 && w < W) visit(w);
 	else { play(0); setText('live', by > 0 ? 'No later change' : 'No earlier change'); }
 }

@@ -7,13 +7,24 @@ function link() {
 	const flags = ['bare', 'loop'].filter(flag => new URLSearchParams(location.hash.slice(1)).has(flag)).map(flag => flag + '&').join('');
 	return '#' + flags + Object.entries(parts).filter(([, value]) => value !== '').map(([key, value]) => key + '=' + escapes(value)).join('&');
 }
+// Writes the link and the view into the history; a jump to another place is a new entry, so that Back returns to the last one.
+let isLoading = false, isAway = false;
+const write = how => { if (!timer) try { history[how]([view, shown == folded], '', link()); } catch {} };
+function leave() {
+	if (isLoading || isAway) return;
+	clearTimeout(later);
+	write('replaceState');
+	isAway = true;
+}
 function save() {
 	clearTimeout(later);
-	later = setTimeout(() => { if (!timer) try { history.replaceState(0, '', link()); } catch {} }, 50);
+	later = setTimeout(() => { write(isAway && link() != location.hash ? 'pushState' : 'replaceState'); isAway = false; }, 50);
 }
 // A window by its time; an element by its kind and name, or by its name alone, in which case nodes precede
 // topics.
 function load(hash = '') {
+	const [box, isFolded] = history.state ?? NONE;
+	isLoading = true;
 	const to = new URLSearchParams(hash), time = parseFloat(to.get('t')), against = parseFloat(to.get('b'));
 	$.q.value = to.get('q') ?? '';
 	base = against >= 0 ? windowAt(against) : -1;
@@ -29,11 +40,16 @@ function load(hash = '') {
 	else compare(base);
 	const name = to.get('sel'), i = ['', 'node:', 'topic:', 'topics:', 'edge:'].map(kind => whole.keys.get(kind + name)).find(i => i >= 0);
 	firstView();
-	pick(name === null ? -1 : i ?? -1, 1, 0, time >= 0);
-	fresh = name === null;
+	pick(name === null ? -1 : i ?? -1, 1, time >= 0);
+	fresh = name === null && !box;
 	if (!(i >= 0) && folded?.keys.has(name)) pickGroup(folded.keys.get(name));
 	search();
 	if (to.get('table')) table(true);
+	if (box) {
+		show(isFolded ? folded : whole);
+		fit(box);
+	}
+	isLoading = false;
 	if (looping && !calm.matches) play(1);
 }
 // The stage as it is, below the name, the time and the sentence, with its style rules and its font.

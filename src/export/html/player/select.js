@@ -4,8 +4,10 @@ const onStage = i => i < 0 ? NONE : shown == whole ? [i] : [...shown.members.key
 const nearOf = i => new Set(onStage(i).flatMap(k => shown.nearby(k)));
 // The element of the whole graph for an element on the stage: the same one, or the first of its members.
 const wholeOf = i => shown == whole ? i : i < shown.N ? whole.keys.get(shown.key(i)) ?? -1 : -1;
-// Selects an element of the whole graph; `look` brings it into view, `from` means that a list did.
-function pick(i, look, fromList, isTimed) {
+// Selects an element of the whole graph; `look` brings it into view, at the nearest time at which it exists unless the time
+// was asked for, too.
+function pick(i, look, isTimed) {
+	if (i >= 0) leave();
 	sel = i;
 	group = -1;
 	if (i >= 0 && look && !isTimed && !whole.isThere(i, now) && base < 0 && !range) toNearest(i);
@@ -14,19 +16,20 @@ function pick(i, look, fromList, isTimed) {
 	if (i >= 0 && look && shown == folded && !nearOf(i).size) show(whole);
 	near = nearOf(i);
 	redraw();
-	if (i < 0) $.follow.ariaPressed = false;
 	card();
 	drawTime();
 	rowNames[rows.findIndex(([k]) => k >= 0 && k == i)]?.scrollIntoView({ block: 'nearest' });
 	if (look && i >= 0) {
 		bring(onStage(i), Math.max(scaleOf(view), TOPIC), 1.5);
-		if (fromList && innerWidth <= 760) stage.scrollIntoView({ block: 'start' });
 	}
-	if (i >= 0 && innerWidth > 760) {
-		if (!sideIsOpen()) choose(side, true);
-		$.card.scrollIntoView({ block: 'nearest' });
-	}
+	if (i >= 0) showCard();
 	save();
+}
+// Brings the card into view: on a phone it is below the stage.
+function showCard() {
+	if (isPhone()) return stage.scrollIntoView({ block: 'start' });
+	if (!sideIsOpen()) choose(side, true);
+	$.card.scrollIntoView({ block: 'nearest' });
 }
 // To the nearest window in which an element exists.
 function toNearest(i) {
@@ -51,6 +54,7 @@ function pickGroup(i) {
 	pick(-1);
 	group = i;
 	pin();
+	showCard();
 	save();
 }
 // In the picture, a group and its connections; when expanded, its members and their connections.
@@ -59,29 +63,19 @@ function pin() {
 	redraw();
 	card();
 }
-// Expands the group in place, with its members around its middle, as far as all of them are visible. Or
-// collapses it again and restores the previous view.
+// Expands the group in place and brings its members into view, or collapses it again and restores the view.
 function unfold() {
 	if (shown == whole) {
 		viewBefore ??= [folded, folded.home];
 		restore();
 		return pin();
 	}
-	const k = scaleOf(view), [x, y, w, h] = folded.boxes[group], inside = folded.members[group].filter(i => i < whole.N);
-	const there = [wide / 2 + k * (x + w / 2 - view[0] - view[2] / 2), high / 2 + k * (y + h / 2 - view[1] - view[3] / 2)];
+	const inside = folded.members[group].filter(i => i < whole.N);
 	viewBefore = [folded, view];
 	show(whole);
-	bring(inside, TOPIC);
+	bring(inside, 0);
 	pin();
-	centerAt(around(boxesOf(inside)), there);
 	setText('live', `${inside.length} elements, expanded`);
-}
-// Moves the view so that the middle of a box is at a point of the stage, and all of the box is visible.
-function centerAt([x, y, w, h], there) {
-	const k = scaleOf(view), within = (at, part, all) => Math.max(part / 2, Math.min(all - part / 2, at));
-	if (w * k > wide || h * k > high) return minimap();
-	const left = within(there[0], w * k, wide), top = within(there[1], h * k, high);
-	fit([x + w / 2 - left / k, y + h / 2 - top / k, wide / k, high / k]);
 }
 $.unfold.onclick = unfold;
 const STATES = { active: 'active', silent: 'silent: running, no message in this window', latched: 'latched: its last message is still valid', declared: 'declared: known from a header only', off: 'not present in this window' }, NIL = '0 Hz';
@@ -103,12 +97,10 @@ function card() {
 	setText('state', title.split(' ')[0] + ' · ' + state + (base < 0 ? '' : ` · compared with window ${base + 1}: ${differs[1] || differs[0] || 'the same'}`));
 	// The members of a group are listed below.
 	$.facts.replaceChildren(...facts.filter(fact => group < 0 || !/^\d+ together/.test(fact)).map(fact => make('p', { textContent: fact })));
-	drawLifeline(g.runs[i][0], g.classes);
 	drawRate($.rate, g, i);
 	$.rate.toggleAttribute('hidden', !$.rate.childElementCount);
 	$.enlarge.hidden = $.rate.hasAttribute('hidden');
 	if (!$.big.hidden) enlarge(true);
-	$.follow.hidden = group >= 0;
 	$.unfold.hidden = group < 0;
 	setText('unfold', shown == whole ? 'Collapse' : 'Expand');
 	setText('endstitle', group < 0 ? 'Connected' : 'Members');
@@ -116,12 +108,22 @@ function card() {
 	$.history.hidden = !past.length;
 	fill('past', past, ([w, , sign, , text, , when]) => make('button', { className: KINDS[sign], onclick: () => go(w) }, make('b', { textContent: data.sides ? '' : when + ' ' }), text), 12);
 	fill('ends', group < 0 ? whole.ends(sel) : folded.members[group], element);
+	const [isOver, signs] = group < 0 ? why(sel) : [0, NONE];
+	$.signsof.hidden = !signs.length;
+	setText('whytitle', isOver ? 'Why?' : 'Last signs');
+	fill('why', signs, ([s, text, k = -1]) => make('button', { className: k < 0 ? '' : 'removed', onclick: () => { visit(windowAt(s)); if (k >= 0) pick(k, 1, 1); } }, make('span', {}, make('b', { textContent: clock(Math.floor(s * 10) / 10) + ' ' }), text)));
 }
-function drawLifeline(runs, classes) {
-	const bits = [];
-	for (let k = 0; k < runs.length && bits.length < 2000; k += 2) if (runs[k + 1]) bits.push([classes[runs[k + 1]], starts[runs[k]], starts[runs[k + 2]] ?? total]);
-	$.lifeline.setAttribute('viewBox', `0 0 ${total} 9`);
-	$.lifeline.innerHTML = bits.concat([['head', starts[now], Math.max(ends[now], starts[now] + total / 150)]]).map(([c, from, to]) => `<rect class="${c}" x=${from} width=${to - from} height=9 />`).join('');
+// The last message and log texts of a node in its lifetime in this window, or in the one before; and if it ended, what else
+// stopped within a second, and what lost its only publisher. Each with its time, and its element.
+function why(i) {
+	const own = data.lives.flatMap(([k, lives]) => k == i ? lives : NONE), until = ends[range?.[1] ?? now];
+	const life = own.findLast(([from]) => from < until) ?? own[0];
+	if (!life) return [0, NONE];
+	const [, end, message, texts] = life, isOver = end < total - .01, w = windowAt(end), all = whole.arrows.map((arrow, k) => [...arrow, whole.N + k]);
+	const stops = reported.flatMap(([, , , lines]) => lines).filter(([s, sign, k]) => sign == 1 && k != i && Math.abs(s - end) <= 1);
+	const lost = all.filter(([a, b, , k]) => a == i && whole.kinds[b] % 3 && whole.class(k, w) && !all.some(([, c, , k]) => c == b && whole.isThere(k, w)));
+	const after = [...stops.map(([s, , k, text]) => [s, text.split(':')[0], k]), ...lost.map(([, b]) => [end, whole.name(b) + ' lost its only publisher', b])];
+	return [isOver, [...message ? [[message[0], 'last message, on ' + message[1]]] : NONE, ...texts.map(([s, text]) => [s, `“${text}”`]).reverse(), ...isOver ? after : NONE]];
 }
 // The rate of an element in each window, with axes; empty if it has none.
 function drawRate(svg, g, i, w = 300, h = 84) {
@@ -131,7 +133,7 @@ function drawRate(svg, g, i, w = 300, h = 84) {
 	if (!(most > 0)) return svg.replaceChildren();
 	const from = range?.[0] ?? now, to = range?.[1] ?? now;
 	const line = rates.map((hz, k) => `${k ? 'L' : 'M'}${x(starts[k]).toFixed(1)} ${y(hz).toFixed(1)}H${x(ends[k]).toFixed(1)}`).join('');
-	const times = ticksOf(total, right - left), last = times.length - 1;
+	const times = ticksOf(right - left), last = times.length - 1;
 	svg.replaceChildren(
 		drawn('rect', { class: 'now', x: x(starts[from]), y: 8, width: Math.max(2, x(ends[to]) - x(starts[from])), height: h - deep - 8 }),
 		...multiples(step, top).flatMap(hz => [drawn('path', { class: 'grid', d: `M${left} ${y(hz)}H${right}` }), drawn('text', { x: left - 5, y: y(hz) + 4, 'text-anchor': 'end' }, withUnit(hz))]),
@@ -149,7 +151,6 @@ function enlarge(on) {
 }
 $.enlarge.onclick = () => enlarge(true);
 onSeek.push(card);
-$.follow.onclick = () => { $.follow.ariaPressed = $.follow.ariaPressed != 'true'; };
 
 // The element under the pointer.
 function hover(e, [title, ...lines]) {

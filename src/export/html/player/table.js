@@ -32,7 +32,7 @@ function chosen() {
 	return edges.filter(i => {
 		const of = whole.kind(i).replace('topics', 'topic').replace('namespace', 'node');
 		const state = $.tstate.value;
-		return (kind ? of == kind : of != 'edge') && (!state || (state == 'here' ? isHere(i) : range ? /added|removed/.test(looksOf(whole)[i][0]) : base < 0 ? whole.marks[whole.class(i, now)] >= 0 || whole.rateChange(i, now) : whole.difference(i, base, now).length));
+		return (kind ? of == kind : of != 'edge') && (!state || (state == 'here' ? isHere(i) : !/^(away)?$/.test(signOf(i))));
 	});
 }
 function cells(i) {
@@ -40,7 +40,7 @@ function cells(i) {
 	const cell = (text, className = '') => make('td', { textContent: text, className });
 	const spark = make('td', { innerHTML: sparkline(rates), title: `${spell(mean(i))} Hz on average over the mission` });
 	return [
-		make('td', {}, shape(i), whole.kind(i)), make('td', {}, make('button', { textContent: whole.name(i), onclick: () => { table(false); pick(i, 1, 1); } })),
+		make('td', {}, shape(i), whole.kind(i)), make('td', {}, make('button', { textContent: whole.name(i), onclick: () => { table(false); pick(i, 1); } })),
 		cell(!away && whole.rate(i, ...range ?? [now]) || '–', 'n'),
 		cell(Math.abs(delta) < 1e-9 ? '' : (delta > 0 ? '+' : '−') + spell(Math.abs(delta)), 'n ' + (delta > 0 ? 'up' : 'down')),
 		spark, cell(first == Infinity ? '–' : clock(Math.floor(first)), 'n'), cell(end ? clock(Math.floor(end)) : '–', 'n'),

@@ -66,19 +66,11 @@ function bring(all, least = RATE, most = 1.5) {
 	if (box[2] > w * 1.01 || box[3] > h * 1.01) [x, y] = densest(boxes, w, h);
 	fit([x - w / 2, y - h / 2, w, h]);
 }
-// The middle of the window of this size that contains most boxes.
+// The middle of the boxes around one of them, which has most others in a window of this size.
 function densest(boxes, w, h) {
-	let best = [-1, 0, 0];
-	for (const [x, y] of boxes.slice(0, 300)) {
-		for (const [left, top] of [[x - 20, y - 20], [x - w / 2, y - h / 2], [x - 20, y - h / 2], [x - w / 2, y - 20]]) {
-			const inside = boxes.filter(b => b[0] >= left && b[0] + b[2] <= left + w && b[1] >= top && b[1] + b[3] <= top + h);
-			if (inside.length > best[0]) {
-				const [bx, by, bw, bh] = inside.length ? around(inside) : [left, top, w, h];
-				best = [inside.length, bx + bw / 2, by + bh / 2];
-			}
-		}
-	}
-	return best.slice(1);
+	const near = ([x, y]) => boxes.filter(b => Math.abs(b[0] - x) < w / 2 - 40 && Math.abs(b[1] - y) < h / 2 - 20);
+	const [x, y, bw, bh] = around(boxes.slice(0, 300).map(near).reduce((best, next) => next.length > best.length ? next : best));
+	return [x + bw / 2, y + bh / 2];
 }
 // The whole graph if its names are legible or nobody can zoom out, else the changes of this window.
 function firstView() {
