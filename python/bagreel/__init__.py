@@ -71,7 +71,6 @@ def render(
     *,
     offset: Iterable[str] = (),
     ns: Iterable[str] = (),
-    verify: bool = False,
     format: str | None = None,  # noqa: A002
     period: str | None = None,
     step: str | None = None,

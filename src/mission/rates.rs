@@ -1,4 +1,4 @@
-//! The rate of every sender over the mission, in pieces: a piece ends where the log tells another rate, or at a long silence.
+//! The rate of every sender over the mission, in pieces: a piece ends where the log has another rate, or at a long silence.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -86,6 +86,11 @@ impl<'a> Rates<'a> {
     pub(crate) fn of(&self, senders: &[&Sender]) -> Vec<Piece> {
         let rates: Vec<Vec<Piece>> = senders.iter().map(|sender| self.pieces(sender)).collect();
         summed(&rates, self.mission.span)
+    }
+
+    /// The mean rate of some senders together while they send: their pauses are left out. `None` without two messages.
+    pub(crate) fn while_sending(&self, senders: &[&Sender]) -> Option<f64> {
+        mean(&self.of(senders))
     }
 
     /// The rates of a sender: its stretches, joined unless a step of the log or a long silence separates
