@@ -133,34 +133,28 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
     follower.run(terminal)
 }
 
-/// Begins to follow a recording as soon as it is there, which its recorder may create later; `None` at a signal.
+/// Begins to follow a recording as soon as its recorder has created it; `None` at a signal.
 fn begun(args: &FollowArgs, reading: &Reading, terminal: &Terminal) -> Result<Option<Follow>> {
-    let what = &args.what;
-    let is_empty = || match what.read_dir() {
-        Ok(mut files) => files.next().is_none(),
-        Err(_) => what.metadata().is_ok_and(|file| file.len() == 0),
+    let idle = args.idle.map(|idle| idle.nanos() as f64 / 1e9);
+    let begun = terminal.seconds();
+    let is_absent = || {
+        args.what
+            .metadata()
+            .map_or(true, |at| at.is_file() && at.len() == 0)
     };
-    let (begun, mut is_waiting) = (terminal.seconds(), false);
+    let is_waiting = || idle.is_none_or(|idle| terminal.seconds() - begun < idle) && is_absent();
+    if is_waiting() {
+        terminal.note(&format!("waiting for `{}`", args.what.display()));
+    }
     terminal.note_signals(true);
-    let follow = loop {
-        let is_idle = args
-            .idle
-            .is_some_and(|idle| terminal.seconds() - begun >= idle.nanos() as f64 / 1e9);
-        match Follow::new(reading.clone(), KEPT) {
-            Err(_) if !is_idle && (!what.exists() || is_empty()) => {}
-            follow => break follow.map(Some),
-        }
-        if !is_waiting {
-            terminal.note(&format!("waiting for `{}`", what.display()));
-            is_waiting = true;
-        }
+    while is_waiting() {
         if terminal.take_signal() {
-            break Ok(None);
+            return Ok(None);
         }
         terminal.wait();
-    };
+    }
     terminal.note_signals(false);
-    follow
+    Follow::new(reading.clone(), KEPT).map(Some)
 }
 
 impl Follower<'_> {

@@ -123,10 +123,10 @@ pub fn survey_text(rows: &[SurveyRow], width: Option<usize>) -> String {
         column("nodes", true, WHOLE, 0),
         column("pub", true, WHOLE, 2),
         column("sub", true, WHOLE, 3),
-        column("starts", true, WHOLE, 8),
-        column("stops", true, WHOLE, 8),
-        column("restarts", true, WHOLE, 0),
-        column("rates", true, WHOLE, 8),
+        column("starts", true, WHOLE, 2),
+        column("stops", true, WHOLE, 2),
+        column("restarts", true, WHOLE, 6),
+        column("rates", true, WHOLE, 2),
         column("evidence", false, 12, 1),
     ];
     let read: Vec<Vec<Cell>> = rows.iter().filter_map(|row| text_row(row, width)).collect();
