@@ -24,4 +24,4 @@ pub use finding::{Cause, Finding, FindingKind, Severity};
 pub(crate) use judge::judge;
 pub use judge::{CheckedFact, Judgement, Verdict};
 pub use report::ReportFormat;
-pub(crate) use report::{FORMATS, Subject, explain};
+pub(crate) use report::{FORMATS, Subject, explain, unchecked};

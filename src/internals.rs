@@ -51,6 +51,7 @@ pub mod layout {
 /// See `src/draw.rs`.
 #[cfg(feature = "render")]
 pub mod draw {
+    pub use crate::draw::figure::Latex;
     pub use crate::draw::{picture, scene, strip, style, text};
 
     /// See `src/draw/paint.rs`.

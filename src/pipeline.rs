@@ -57,7 +57,10 @@ pub use {
 };
 #[cfg(feature = "cli")]
 pub(crate) use {
-    gate::expectation, read::mission_file, render::check as check_outputs, survey::each,
+    gate::{expectation, put},
+    read::mission_file,
+    render::check as check_outputs,
+    survey::each,
 };
 
 worded! {

@@ -149,6 +149,64 @@ fn readme_shows_the_chart_of_the_example_report() {
     assert_eq!(chart(README), chart(&report));
 }
 
+/// Words that once meant what another word means now.
+const OTHER_WORDS: [&str; 2] = ["ledger", "chronicle"];
+
+#[test]
+fn help_docs_and_outputs_use_the_defined_words() {
+    let defined = first_cells(&chapter("words.md"), "| word | meaning |");
+    for word in [
+        "event",
+        "change",
+        "reconfiguration",
+        "phase",
+        "step",
+        "window",
+        "rule, finding",
+    ] {
+        assert!(defined.iter().any(|own| own.starts_with(word)), "{word}");
+    }
+    let dir = folder();
+    let mut texts: Vec<(String, String)> = Vec::new();
+    for (path, text) in pages() {
+        texts.push((path.display().to_string(), text));
+    }
+    for command in &help_commands() {
+        texts.push((command.clone(), help(&[command, "--help"])));
+    }
+    for command in [
+        "bagreel info run.bag",
+        "bagreel events run.bag --phases auto --parts --all",
+        "bagreel diff run.bag run.mcap",
+        "bagreel render run.bag -o - --format md",
+        "bagreel check run.mcap --expect graph.yaml",
+    ] {
+        let graph = root().join("examples/ci/graph.yaml");
+        fs::copy(graph, dir.path().join("graph.yaml")).unwrap();
+        let text = String::from_utf8(run(command, dir.path()).stdout).unwrap();
+        assert!(!text.is_empty(), "{command}");
+        texts.push((command.to_owned(), text));
+    }
+    for (name, text) in &texts {
+        let text = text.to_lowercase();
+        for word in OTHER_WORDS {
+            assert!(!text.contains(word), "{name}: {word}");
+        }
+        // What is counted as changes is not called otherwise.
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let counts = words
+            .windows(2)
+            .filter(|pair| pair[0].parse::<u32>().is_ok());
+        for pair in counts {
+            let word = pair[1].trim_matches(|c: char| !c.is_alphanumeric());
+            assert!(
+                !["events", "reconfigurations", "entries"].contains(&word),
+                "{name}: {pair:?}"
+            );
+        }
+    }
+}
+
 #[test]
 fn docs_list_every_output_format_and_every_kind_of_evidence() {
     let rows = first_cells(&chapter("outputs.md"), "| extension | output |");

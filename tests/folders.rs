@@ -302,9 +302,9 @@ fn the_log_of_a_folder_names_the_bag_of_every_event() {
         let rows = text.lines().map(|row| format!("{lead}{row}\n"));
         rows.collect::<Vec<_>>()
     };
-    let csv = shown("events F --format csv --parts --phases");
+    let csv = shown("events F --format csv --parts --phases auto");
     let [w, c] = [("a, b/w.bag", "\"a, b/w.bag\","), ("c.mcap", "c.mcap,")]
-        .map(|(bag, lead)| own(bag, "--format csv --parts --phases", lead));
+        .map(|(bag, lead)| own(bag, "--format csv --parts --phases auto", lead));
     assert_eq!(
         csv,
         format!(

@@ -197,7 +197,7 @@ fn a_second_signal_ends_the_writing_of_outputs() {
             .unwrap()
             .success()
     );
-    let args = ["follow", "r.bag.active", "-p", "0.2", "-o", "f.html"];
+    let args = ["follow", "r.bag.active", "-o", "f.html"];
     let mut follower = bagreel(folder.path(), &args).spawn().unwrap();
     let id = follower.id().to_string();
     let interrupt = || Command::new("kill").args(["-INT", &id]).status().unwrap();

@@ -171,7 +171,7 @@ const COMMANDS: &[&str] = &[
     "info E",
     "info E --format csv",
     "events W",
-    "events W --parts --phases",
+    "events W --parts --phases auto",
     "extract C -o x.csv",
     "extract C -o - --format csv",
     "extract C -o fields --fields",
@@ -295,7 +295,10 @@ fn table_headers_align_with_their_columns() {
     let end =
         |text: &str, line: &str| line.split(text).next().unwrap().chars().count() + text.len();
     assert_eq!(end("messages", head), end("1627", row), "{head}\n{row}");
-    assert!(head.contains("rate") && head.contains("activity"), "{head}");
+    assert!(
+        head.contains("while sending") && head.contains("activity"),
+        "{head}"
+    );
     assert!(lines.iter().any(|line| line.starts_with("  node ")));
 }
 

@@ -42,7 +42,11 @@ __all__ = [
 ]
 
 
-def tables(bags: Paths, *, period: str = "10s", align: Literal["clock", "bag"] = "clock") -> Table:
+def __dir__() -> list[str]:
+    return __all__
+
+
+def tables(bags: Paths, *, period: str | float = "10s", align: Literal["clock", "bag"] = "clock") -> Table:
     """Counts the messages of one recording, a bag or its parts, by its index: a row per publisher, topic and window.
 
     The columns are those of `bagreel tables`, which counts many bags in parallel; `bag` is the first path as given. Losses
@@ -52,12 +56,35 @@ def tables(bags: Paths, *, period: str = "10s", align: Literal["clock", "bag"] =
         BagreelError: a bag cannot be read.
         ValueError: an option is invalid.
     """
-    return _bagreel.tables(texts(bags), period=period, align=align)
+    return _bagreel.tables(texts(bags), period=str(period), align=align)
 
 
-def read(uris: Paths, *, period: str | None = None, align: Literal["clock", "bag"] = "bag") -> Mission:
-    """Reads bags, or a mission's JSON, as one mission, with all evidence in payloads."""
-    return _bagreel.read(texts(uris), period=period, align=align)
+def read(
+    uris: Paths,
+    *,
+    period: str | float | None = None,
+    align: Literal["clock", "bag"] = "bag",
+    start: str | None = None,
+    end: str | None = None,
+    offset: Iterable[str] = (),
+    ns: Iterable[str] = (),
+    topology: Iterable[str | os.PathLike[str]] = (),
+    source: str | os.PathLike[str] | None = None,
+    infer: str | None = None,
+) -> Mission:
+    """Reads bags, or a mission's JSON, as one mission, with all evidence in payloads.
+
+    The options are those of `bagreel render`; `period` is a text such as `30s`, or a number of seconds.
+    """
+    period = None if period is None else str(period)
+    options = {"start": start, "end": end, "offset": list(offset), "ns": list(ns), "topology": list(topology)}
+    options |= {"source": source, "infer": infer}
+    if not any(options.values()):
+        return _bagreel.read(texts(uris), period=period, align=align)
+    with tempfile.TemporaryDirectory(prefix="bagreel-") as folder:
+        path = Path(folder) / "mission.json"
+        run("render", uris, output=path, period=period, align=align, **options)
+        return _bagreel.read([str(path)])
 
 
 def to_dict(mission: Mission) -> dict[str, Any]:
@@ -71,9 +98,8 @@ def render(
     *,
     offset: Iterable[str] = (),
     ns: Iterable[str] = (),
-    verify: bool = False,
     format: str | None = None,  # noqa: A002
-    period: str | None = None,
+    period: str | float | None = None,
     step: str | None = None,
     start: str | None = None,
     end: str | None = None,

@@ -197,7 +197,9 @@ impl Mission {
     }
 
     fn __repr__(&self) -> String {
-        let (windows, events) = (self.0.windows.len(), self.0.log.events.len());
+        // As many as `events` has.
+        let events = log(&self.0, LogFormat::Ndjson, LogOptions::default());
+        let (windows, events) = (self.0.windows.len(), events.lines().count());
         format!("<bagreel.Mission: {windows} windows, {events} events>")
     }
 }

@@ -54,8 +54,11 @@ impl Cell {
     }
 }
 
-/// A table with a header, at most `width` characters wide if columns can shrink that far; no trailing spaces.
+/// A table with a header, empty without rows, at most `width` characters wide if columns can shrink that far; no trailing spaces.
 pub(crate) fn table(columns: &[Column], rows: &[Vec<Cell>], width: Option<usize>) -> String {
+    if rows.is_empty() {
+        return String::new();
+    }
     let natural = |at: usize| {
         let cells = rows.iter().filter_map(|row| row.get(at)).map(Cell::width);
         cells

@@ -4,6 +4,8 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::nearest::nearest;
+
 /// The reason why a command failed. `Display` is one sentence without a period; [`Error::hint`] is advice printed
 /// after it.
 #[derive(Debug)]
@@ -151,7 +153,10 @@ impl Error {
     /// Advice for the user; empty if there is none.
     pub fn hint(&self) -> String {
         match self {
-            Self::Io { source, .. } => io_hint(source).to_owned(),
+            Self::Io { source, path, .. } => match misspelled(source, path) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => io_hint(source).to_owned(),
+            },
             Self::Malformed { hint, .. } => hint.clone(),
             other => other
                 .fault()
@@ -163,6 +168,22 @@ impl Error {
     pub fn is_usage(&self) -> bool {
         matches!(self, Self::Usage(_))
     }
+}
+
+/// The file beside a missing one whose name is nearest to its.
+fn misspelled(source: &io::Error, path: &Path) -> Option<String> {
+    let name = path
+        .file_name()
+        .filter(|_| source.kind() == io::ErrorKind::NotFound)?;
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    let files = folder.unwrap_or(Path::new(".")).read_dir().ok()?.flatten();
+    let names: Vec<String> = files
+        .map(|file| file.file_name().display().to_string())
+        .collect();
+    let near = nearest(&name.to_string_lossy(), names.iter().map(String::as_str))?;
+    Some(path.with_file_name(near).display().to_string())
 }
 
 fn io_hint(source: &io::Error) -> &'static str {
@@ -181,7 +202,12 @@ impl fmt::Display for Error {
                 path,
                 doing,
                 source,
-            } => write!(f, "cannot {doing} `{}`: {source}", path.display()),
+            } => {
+                let why = source.to_string();
+                // Temporary files add their own path, which nobody gave.
+                let why = why.split(" at path ").next().unwrap_or_default();
+                write!(f, "cannot {doing} `{}`: {why}", path.display())
+            }
             Self::Malformed { path, expected, .. } => write!(
                 f,
                 "`{}` is malformed at byte 0: expected {expected}",

@@ -21,7 +21,7 @@ pub(crate) const UNUSUAL: i64 = 3;
 /// The most pauses of a regular sender: one that pauses more often, and for more than a fifth of the time, sends only
 /// when needed.
 pub(crate) const OFTEN: usize = 4;
-/// The length of a silence as a multiple of the longest pause that the same sender made before.
+/// The length of a silence as a multiple of the second longest pause that the same sender made before.
 pub(crate) const LONGER: i64 = 2;
 /// The most pauses of a recording, a silence among them, that are at least half as long: of more, the first is as usual as the last.
 pub(crate) const ALIKE: usize = 3;
@@ -123,6 +123,8 @@ pub(crate) const EVEN_OF_TWO: f64 = 1.5;
 pub(crate) const FEWEST_OF_RATE: u64 = 6;
 /// The shortest duration of a rate that is an event.
 pub(crate) const RATE_HOLDS_NS: i64 = 3 * SECOND;
+/// The ratio of a steady rate to that of the stray messages before it from which on these are about none.
+pub(crate) const ABOUT_NONE: f64 = 10.0;
 /// The longest pause of a sender while it changes its rate.
 pub(crate) const RATE_PAUSE_NS: i64 = 5 * SECOND;
 

@@ -39,13 +39,6 @@ impl Inputs {
     }
 }
 
-#[derive(Debug, Args)]
-pub(super) struct VerifyArgs {
-    /// Read everything again with a second, independent reader and compare.
-    #[arg(long)]
-    pub(super) verify: bool,
-}
-
 /// The part of a recording.
 #[derive(Clone, Copy, Debug, Default, Args)]
 pub(super) struct RangeArgs {

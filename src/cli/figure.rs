@@ -26,8 +26,8 @@ pub(super) struct FigureArgs {
     /// `out/<bag name>.pdf`.
     #[arg(long = "output", short, value_name = "FILE")]
     outputs: Vec<OsString>,
-    /// Lifelines, the graph of who publishes to whom, the holders of topics that change hands, or the reconfigurations one
-    /// by one.
+    /// Lifelines, the graph of who publishes to whom, the holders of topics that change hands, or the steps from phase to
+    /// phase.
     #[arg(long, default_value = "lives", value_parser = one_of(FigureKind::ALL))]
     kind: FigureKind,
     /// Width on paper: `88mm`, `180mm`. [default: 88mm]

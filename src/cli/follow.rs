@@ -8,7 +8,7 @@ use clap::Args;
 use super::render;
 use super::show::NO_EVENTS;
 use super::terminal::Terminal;
-use super::values::{length, one_of, period};
+use super::values::{one_of, period};
 use super::{DONE, code, gate};
 use crate::bag::Growth;
 use crate::base::error::Result;
@@ -36,10 +36,7 @@ pub(super) struct FollowArgs {
     /// Output file, written at the end as `render` writes it from the closed recording. Repeatable.
     #[arg(long = "output", short, value_name = "FILE")]
     outputs: Vec<OsString>,
-    /// Length of a window in outputs, and for rules about rates.
-    #[arg(long, short, value_parser = length)]
-    period: Option<Length>,
-    /// Stop when nothing was written for this long. [default: when the recorder closes the recording, or at a signal]
+    /// Stop when nothing was written, or no recording was there, for this long. [default: when the recorder closes the recording, or at a signal]
     #[arg(long, value_name = "TIME", value_parser = period)]
     idle: Option<Period>,
 }
@@ -107,13 +104,14 @@ struct Follower<'a> {
 
 /// Follows a recording to its end.
 pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
-    let mut reading = Reading::of([&args.what]);
-    reading.division.length = args.period.unwrap_or(Length::Auto);
+    let reading = Reading::of([&args.what]);
     let outputs = args.outputs.iter().map(|o| Output::named(o, None));
     let job = Render::new(reading.clone(), outputs.collect::<Result<_>>()?)?;
     crate::pipeline::check_outputs(&job)?;
     let findings = args.expect.as_deref().map(FindingFeed::new).transpose()?;
-    let follow = Follow::new(reading, KEPT)?;
+    let Some(follow) = begun(args, &reading, terminal)? else {
+        return Ok(DONE);
+    };
     if args.what.is_dir() && follow.path() != args.what {
         let newest = follow.path().display();
         terminal.note(&format!(
@@ -133,6 +131,30 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
         is_silent: true,
     };
     follower.run(terminal)
+}
+
+/// Begins to follow a recording as soon as its recorder has created it; `None` at a signal.
+fn begun(args: &FollowArgs, reading: &Reading, terminal: &Terminal) -> Result<Option<Follow>> {
+    let idle = args.idle.map(|idle| idle.nanos() as f64 / 1e9);
+    let begun = terminal.seconds();
+    let is_absent = || {
+        args.what
+            .metadata()
+            .map_or(true, |at| at.is_file() && at.len() == 0)
+    };
+    let is_waiting = || idle.is_none_or(|idle| terminal.seconds() - begun < idle) && is_absent();
+    if is_waiting() {
+        terminal.note(&format!("waiting for `{}`", args.what.display()));
+    }
+    terminal.note_signals(true);
+    while is_waiting() {
+        if terminal.take_signal() {
+            return Ok(None);
+        }
+        terminal.wait();
+    }
+    terminal.note_signals(false);
+    Follow::new(reading.clone(), KEPT).map(Some)
 }
 
 impl Follower<'_> {
@@ -198,7 +220,7 @@ impl Follower<'_> {
         let Some(findings) = &mut self.findings else {
             return Ok(());
         };
-        let length = self.args.period.unwrap_or(findings.length());
+        let length = findings.length();
         let (follow, format) = (&self.follow, self.format);
         let lines = self.checks.spend(terminal, || {
             let known = follow.so_far(u64::MAX, length)?;

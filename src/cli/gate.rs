@@ -200,7 +200,11 @@ fn notices(missions: &[Mission]) -> Notices {
 }
 
 /// Prints the files written and what is in them, if there are files.
-fn wrote<'a>(targets: impl Iterator<Item = &'a Target>, what: &str, terminal: &mut Terminal) {
+pub(super) fn wrote<'a>(
+    targets: impl Iterator<Item = &'a Target>,
+    what: &str,
+    terminal: &mut Terminal,
+) {
     let files = targets.filter(|target| **target != Target::Stdout);
     let mut files = files.map(Target::path).peekable();
     if files.peek().is_some() {

@@ -7,7 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{ArgAction, Args};
 
 use super::applies::{self, Given, OF_GRAPHS};
-use super::args::{GraphArgs, Inputs, PhaseArgs, RateArgs, TimeArgs, VerifyArgs, reading};
+use super::args::{GraphArgs, Inputs, PhaseArgs, RateArgs, TimeArgs, reading};
 use super::code;
 use super::terminal::Terminal;
 use super::values::{bytes, link, one_of, size, width};
@@ -32,8 +32,6 @@ use crate::view::{Grouping, Hide, Mode, NameFilter, ViewOptions};
 pub(super) struct RenderArgs {
     #[command(flatten)]
     pub(super) inputs: Inputs,
-    #[command(flatten)]
-    pub(super) again: VerifyArgs,
     #[arg(long = "output", short, value_name = "FILE", help = shown(OUTPUT))]
     pub(super) outputs: Vec<OsString>,
     /// Format of outputs without a known extension, such as `-`.
@@ -254,7 +252,6 @@ fn division(mission: &Mission) -> String {
 fn job(args: &RenderArgs, given: &Given) -> Result<Render> {
     let look = &args.look;
     let mut reading = reading(&args.inputs, &args.graph)?;
-    reading.verify = args.again.verify;
     reading.division = args.time.division();
     reading.rate_change = args.rate.rate_change;
     reading.phases = args.phases.phases.clone();

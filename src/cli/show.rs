@@ -1,34 +1,44 @@
 //! The commands that describe the contents of bags: `info`, `events`.
 
+use std::ffi::OsString;
 use std::path::Path;
 
 use clap::{Args, ValueEnum};
 
 use super::applies::{self, Given};
-use super::args::{GraphArgs, Inputs, RangeArgs, RateArgs, VerifyArgs, reading};
+use super::args::{GraphArgs, Inputs, RangeArgs, RateArgs, reading};
 use super::terminal::Terminal;
-use super::values::one_of;
+use super::values::{one_of, phases};
 use super::{DONE, SKIPPED, code};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
+use crate::export::check::check as check_targets;
 use crate::export::tables::TableFormat;
+use crate::export::target::Target;
 use crate::graph::window::Length;
 use crate::mission::Mission;
-use crate::mission::event_log::{LogFormat, LogLine, LogOptions, body, lines, log, whole};
-use crate::mission::info::{SurveyRow, json, survey_text};
-use crate::pipeline::{Reading, Survey, each, explain, is_survey, read, survey, survey_file};
+use crate::mission::event_log::{LogFormat, LogLine, LogOptions, body, lines, whole};
+use crate::mission::info::summary::summary;
+use crate::mission::info::{SurveyRow, info, json, survey_text, text, why};
+use crate::pipeline::{
+    Phases, Reading, Survey, each, explain, is_survey, put, read, survey, survey_file,
+};
 
 #[derive(Debug, Args)]
 pub(super) struct InfoArgs {
     #[command(flatten)]
     inputs: Inputs,
-    #[command(flatten)]
-    again: VerifyArgs,
+    /// Read everything again with a second, independent reader and compare.
+    #[arg(long)]
+    verify: bool,
     /// Output format.
     #[arg(long, value_enum, default_value_t)]
     format: InfoFormat,
+    /// Write this file instead: `.txt`, `.json`, `.csv` or `.parquet`. Repeatable.
+    #[arg(long = "output", short, value_name = "FILE", conflicts_with = "format")]
+    outputs: Vec<OsString>,
     /// List the evidence for a node or topic (one name) or an edge (two names).
-    #[arg(long, num_args = 1..=2, value_names = ["NAME", "NAME"], conflicts_with_all = ["format", "verify"])]
+    #[arg(long, num_args = 1..=2, value_names = ["NAME", "NAME"], conflicts_with_all = ["format", "outputs", "verify"])]
     why: Vec<String>,
     #[command(flatten)]
     graph: GraphArgs,
@@ -45,16 +55,54 @@ pub(super) enum InfoFormat {
 }
 
 impl InfoFormat {
-    /// The table format; CSV if the format is not one.
+    /// The format of an extension.
+    fn of(extension: &str) -> Option<Self> {
+        Some(match extension {
+            "txt" => Self::Text,
+            "json" => Self::Json,
+            "csv" => Self::Csv,
+            "parquet" => Self::Parquet,
+            _ => return None,
+        })
+    }
+
+    /// The summary of a mission, or the survey of a folder, in this format.
     ///
     /// # Errors
     /// If this build does not write it.
-    fn of_table(self) -> Result<TableFormat> {
-        match self {
-            Self::Parquet => TableFormat::Parquet.built(),
-            _ => Ok(TableFormat::Csv),
-        }
+    fn file(self, rows: &[SurveyRow], is_survey: bool, width: Option<usize>) -> Result<Vec<u8>> {
+        let one = rows
+            .first()
+            .and_then(|row| row.info.as_ref())
+            .filter(|_| !is_survey);
+        Ok(match (self, one) {
+            (Self::Text, Some(one)) => text(one, width).into_bytes(),
+            (Self::Text, None) => survey_text(rows, width).into_bytes(),
+            (Self::Json, Some(one)) => json(one).into_bytes(),
+            (Self::Json, None) => json(&rows).into_bytes(),
+            (Self::Csv, _) => survey_file(rows, TableFormat::Csv)?,
+            (Self::Parquet, _) => survey_file(rows, TableFormat::Parquet.built()?)?,
+        })
     }
+}
+
+/// The outputs by their extensions; only standard output, in the default format, without any.
+fn outputs<F: Copy>(
+    given: &[OsString],
+    default: F,
+    of: fn(&str) -> Option<F>,
+    hint: &str,
+) -> Result<Vec<(Target, F)>> {
+    if given.is_empty() {
+        return Ok(vec![(Target::Stdout, default)]);
+    }
+    let output = |name: &OsString| {
+        let target = Target::parse(name);
+        let format = target.extension().and_then(|extension| of(&extension));
+        let what = || format!("`{}` has no known extension", name.display());
+        Ok((target, format.ok_or_else(|| Error::usage(what(), hint))?))
+    };
+    given.iter().map(output).collect()
 }
 
 #[derive(Debug, Args)]
@@ -64,15 +112,19 @@ pub(super) struct EventsArgs {
     /// Output format.
     #[arg(long, value_name = "WORD", default_value = "text", value_parser = one_of(LogFormat::ALL))]
     format: LogFormat,
+    /// Write this file instead: `.txt`, `.csv`, `.ndjson`, `.json` or `.md`. Repeatable.
+    #[arg(long = "output", short, value_name = "FILE", conflicts_with = "format")]
+    outputs: Vec<OsString>,
     /// List below each event the topics and connections that it affects.
     #[arg(long)]
     parts: bool,
     /// Include housekeeping topics and the recorder.
     #[arg(long)]
     all: bool,
-    /// Show where each phase of the mission begins.
-    #[arg(long)]
-    phases: bool,
+    /// Phases whose beginnings are shown: detected (`auto`), `none`, or a file of lines such as `0:38 navigation` or names
+    /// alone.
+    #[arg(long, value_name = "FILE|auto|none", default_value = "none", value_parser = phases)]
+    phases: Phases,
     #[command(flatten)]
     range: RangeArgs,
     #[command(flatten)]
@@ -87,139 +139,174 @@ const PARTS: u32 = 32;
 /// The note about an empty log.
 pub(super) const NO_EVENTS: &str = "no events: nothing started, stopped or changed";
 
-/// The log for people: the mission as one sentence, and its events.
-fn introduced(mission: &Mission, options: LogOptions) -> impl Iterator<Item = LogLine> {
-    let first = LogLine::plain(&crate::mission::info::info(mission).summary);
-    std::iter::once(first).chain(lines(mission, options))
+/// The logs of one mission, or of the bags of a folder.
+struct Logs {
+    options: LogOptions,
+    outputs: Vec<(Target, LogFormat)>,
+    /// The rows for each output, and the lines for people.
+    rows: Vec<String>,
+    shown: Vec<LogLine>,
+    notices: Notices,
 }
 
-/// Prints the log of a mission, or those of the bags in a folder.
+impl Logs {
+    /// Adds the log of a mission; that of a bag in a folder has its name.
+    fn add(&mut self, bag: Option<&str>, mission: &Mission) {
+        let first = LogLine::plain(&summary(mission, &info(mission)));
+        let lines = std::iter::once(first).chain(lines(mission, self.options));
+        let lines: Vec<LogLine> = bag.map(LogLine::plain).into_iter().chain(lines).collect();
+        for ((_, format), rows) in self.outputs.iter().zip(&mut self.rows) {
+            rows.push_str(&match format {
+                LogFormat::Text => lines.iter().map(|line| line.text(None)).collect(),
+                format => body(mission, bag, *format, self.options),
+            });
+        }
+        self.shown.extend(lines);
+        // The log is the same for every period.
+        let own = mission.notices.without(NoticeKind::Chosen);
+        self.notices.extend(own.iter().map(|notice| match bag {
+            Some(bag) => Notice {
+                text: format!("`{bag}`: {}", notice.text),
+                ..notice
+            },
+            None => notice,
+        }));
+    }
+}
+
+/// Prints or writes the log of a mission, or those of the bags in a folder.
 pub(super) fn events(args: &EventsArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     let mut reading = reading(&args.inputs, &args.graph)?;
     reading.division = args.range.in_windows(None);
     reading.rate_change = args.rate.rate_change;
+    reading.phases.clone_from(&args.phases);
     applies::check_inputs(given, &reading)?;
     if args.graph.source.is_some() {
         terminal
             .note("elements that only source code declares have no times and are not in the log");
     }
-    let options = LogOptions {
-        parts: args.parts,
-        all: args.all,
-        phases: args.phases,
+    let hint = "write `x.txt`, `x.csv`, `x.ndjson`, `x.json` or `x.md`";
+    let outputs = outputs(&args.outputs, args.format, LogFormat::of, hint)?;
+    let mut logs = Logs {
+        options: LogOptions {
+            parts: args.parts,
+            all: args.all,
+            phases: args.phases != Phases::None,
+        },
+        rows: vec![String::new(); outputs.len()],
+        outputs,
+        shown: Vec::new(),
+        notices: Notices::new(),
     };
-    let format = args.format;
-    if let ([folder], [input]) = (&args.inputs.bags[..], &reading.inputs[..])
-        && is_survey(input)
-    {
-        let each = LogOf { format, options };
-        return events_of_folder(folder, &reading, each, terminal);
+    may_write(&logs.outputs, &reading)?;
+    let folder = folder(&args.inputs, &reading);
+    match folder {
+        None => logs.add(None, &read(&reading, terminal)?),
+        Some(folder) => {
+            for bag in each(folder, &reading, terminal)? {
+                match bag.mission {
+                    Ok(mission) => logs.add(Some(&bag.name), &mission),
+                    Err(unread) => {
+                        let kind = if unread.is_loss {
+                            NoticeKind::Damaged
+                        } else {
+                            NoticeKind::Note
+                        };
+                        logs.notices.add(Notice::new(kind, unread.why));
+                    }
+                }
+            }
+        }
     }
-    let mission = read(&reading, terminal)?;
-    if format == LogFormat::Text {
-        let lines: Vec<LogLine> = introduced(&mission, options).collect();
-        terminal.log(&lines, format)?;
-    } else {
-        terminal.results(&log(&mission, format, options))?;
-        if lines(&mission, options).is_empty() {
+    let is_empty = folder.is_none() && logs.shown.len() == 1;
+    for ((target, format), rows) in logs.outputs.iter().zip(&logs.rows) {
+        let text = whole(rows, *format, folder.is_some());
+        match (target, format) {
+            (Target::Stdout, LogFormat::Text) => drop(terminal.log(&logs.shown, *format)?),
+            (Target::Stdout, _) => terminal.results(&text)?,
+            (file, _) => put(file, text.as_bytes())?,
+        }
+        if is_empty && *format != LogFormat::Text {
             terminal.note(NO_EVENTS);
         }
     }
-    // The log is the same for every period.
-    terminal.notices(&mission.notices.without(NoticeKind::Chosen));
-    Ok(code(&mission))
+    wrote(&logs.outputs, "the event log", terminal);
+    terminal.notices(&logs.notices);
+    Ok(if logs.notices.any_loss() {
+        SKIPPED
+    } else {
+        DONE
+    })
 }
 
-/// The requested form of a log.
-#[derive(Clone, Copy)]
-struct LogOf {
-    format: LogFormat,
-    options: LogOptions,
-}
-
-/// Prints the logs of all bags below a folder as one.
-fn events_of_folder(
-    folder: &Path,
-    reading: &Reading,
-    form: LogOf,
-    terminal: &mut Terminal,
-) -> Result<u8> {
-    let LogOf { format, options } = form;
-    let (mut rows, mut shown) = (String::new(), Vec::new());
-    let mut notices = Notices::new();
-    for bag in each(folder, reading, terminal)? {
-        let name = &bag.name;
-        match bag.mission {
-            Ok(mission) => {
-                if format == LogFormat::Text {
-                    shown.push(LogLine::plain(name));
-                    shown.extend(introduced(&mission, options));
-                } else {
-                    rows += &body(&mission, Some(name), format, options);
-                }
-                let own = mission.notices.without(NoticeKind::Chosen);
-                notices.extend(own.iter().map(|notice| Notice {
-                    text: format!("`{name}`: {}", notice.text),
-                    ..notice
-                }));
-            }
-            Err(unread) if unread.is_loss => {
-                notices.add(Notice::new(NoticeKind::Damaged, unread.why));
-            }
-            Err(empty) => notices.add(Notice::new(NoticeKind::Note, empty.why)),
-        }
+/// The folder of bags that is the only input, if it is.
+fn folder<'a>(inputs: &'a Inputs, reading: &Reading) -> Option<&'a Path> {
+    match (&inputs.bags[..], &reading.inputs[..]) {
+        ([folder], [input]) if is_survey(input) => Some(folder),
+        _ => None,
     }
-    match format {
-        LogFormat::Text => drop(terminal.log(&shown, format)?),
-        _ => terminal.results(&whole(&rows, format, true))?,
-    }
-    terminal.notices(&notices);
-    Ok(if notices.any_loss() { SKIPPED } else { DONE })
 }
 
-/// Prints the summary of a mission, or a row for each bag of a folder.
-pub(super) fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
+/// Refuses to overwrite an input, or to write a file twice.
+fn may_write<F>(outputs: &[(Target, F)], reading: &Reading) -> Result<()> {
+    let targets: Vec<Target> = outputs.iter().map(|(target, _)| target.clone()).collect();
+    check_targets(&targets, &reading.files())
+}
+
+/// Prints the files written.
+fn wrote<F>(outputs: &[(Target, F)], what: &str, terminal: &mut Terminal) {
+    super::gate::wrote(outputs.iter().map(|(target, _)| target), what, terminal);
+}
+
+/// Prints or writes the summary of a mission, or a row for each bag of a folder.
+pub(super) fn info_of(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     let mut reading = reading(&args.inputs, &args.graph)?;
-    reading.verify = args.again.verify;
+    reading.verify = args.verify;
     reading.division.length = Length::Parts(PARTS);
     applies::check_inputs(given, &reading)?;
-    let table = args.format.of_table()?;
-    if let ([folder], [input]) = (&args.inputs.bags[..], &reading.inputs[..])
-        && is_survey(input)
+    let hint = "write `x.txt`, `x.json`, `x.csv` or `x.parquet`";
+    let outputs = outputs(&args.outputs, args.format, InfoFormat::of, hint)?;
+    if outputs
+        .iter()
+        .any(|(_, format)| *format == InfoFormat::Parquet)
     {
-        if !args.why.is_empty() {
+        TableFormat::Parquet.built()?;
+    }
+    may_write(&outputs, &reading)?;
+    let folder = folder(&args.inputs, &reading);
+    if !args.why.is_empty() {
+        if folder.is_some() {
             let what = "`--why` explains one mission, but a folder of bags contains many";
             return Err(Error::usage(what, "give one of the bags"));
         }
-        let Survey { rows, skipped } = survey(folder, &reading, terminal)?;
-        match args.format {
-            InfoFormat::Text => terminal.results(&survey_text(&rows, terminal.width()))?,
-            InfoFormat::Json => terminal.results(&json(&rows))?,
-            _ => terminal.table(&survey_file(&rows, table)?)?,
-        }
-        return Ok(if skipped { SKIPPED } else { DONE });
-    }
-    if !args.why.is_empty() {
         reading.collect.why.clone_from(&args.why);
         let (mission, pieces) = explain(&reading, terminal)?;
-        terminal.fitted(&crate::mission::info::why(&mission, &args.why, &pieces)?)?;
+        terminal.fitted(&why(&mission, &args.why, &pieces)?)?;
         terminal.notices(&mission.notices);
         return Ok(code(&mission));
     }
-    let mission = read(&reading, terminal)?;
-    let info = || crate::mission::info::info(&mission);
-    match args.format {
-        InfoFormat::Text => {
-            terminal.results(&crate::mission::info::text(&info(), terminal.width()))?;
-        }
-        InfoFormat::Json => terminal.results(&json(&info()))?,
-        _ => {
-            let bag = mission.bags.first();
-            let name = bag.map_or_else(String::new, |bag| bag.name.clone());
-            let row = SurveyRow::of(name, &mission);
-            terminal.table(&survey_file(&[row], table)?)?;
+    let (rows, notices, code) = if let Some(folder) = folder {
+        let Survey { rows, skipped } = survey(folder, &reading, terminal)?;
+        (rows, Notices::new(), if skipped { SKIPPED } else { DONE })
+    } else {
+        let mission = read(&reading, terminal)?;
+        let bag = mission.bags.first();
+        let name = bag.map_or_else(String::new, |bag| bag.name.clone());
+        let row = SurveyRow::of(name, &mission);
+        (vec![row], mission.notices.clone(), code(&mission))
+    };
+    for (target, format) in &outputs {
+        let width = terminal.width().filter(|_| *target == Target::Stdout);
+        let bytes = format.file(&rows, folder.is_some(), width)?;
+        match (target, format) {
+            (Target::Stdout, InfoFormat::Text | InfoFormat::Json) => {
+                terminal.results(&String::from_utf8_lossy(&bytes))?;
+            }
+            (Target::Stdout, _) => terminal.table(&bytes)?,
+            (file, _) => put(file, &bytes)?,
         }
     }
-    terminal.notices(&mission.notices);
-    Ok(code(&mission))
+    wrote(&outputs, "the summary", terminal);
+    terminal.notices(&notices);
+    Ok(code)
 }

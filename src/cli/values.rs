@@ -109,9 +109,13 @@ pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
 }
 
 pub(super) fn width(text: &str) -> Result<f64, String> {
-    let millimetres = text.strip_suffix("mm").and_then(|n| n.parse().ok());
-    let millimetres = millimetres.filter(|mm: &f64| (20.0..=2000.0).contains(mm));
-    millimetres.ok_or_else(|| "write a width such as `88mm`; 20 to 2000".to_owned())
+    let units = [("mm", 1.0), ("cm", 10.0), ("in", 25.4)];
+    let mut known = units.iter();
+    let millimetres =
+        known.find_map(|(unit, mm)| Some(text.strip_suffix(unit)?.parse::<f64>().ok()? * mm));
+    let millimetres = millimetres.filter(|mm| (20.0..=2000.0).contains(mm));
+    millimetres
+        .ok_or_else(|| "write a width such as `88mm`, `8.8cm` or `3.5in`; 20 to 2000 mm".to_owned())
 }
 
 pub(super) fn points(text: &str) -> Result<f64, String> {

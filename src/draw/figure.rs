@@ -12,7 +12,7 @@ mod tex;
 use crate::base::words::worded;
 use crate::draw::scene::Scene;
 use crate::draw::timeline::source::FigureSource;
-pub(crate) use tex::file as latex;
+pub use tex::Latex;
 
 worded! {
     /// The kind of figure.

@@ -14,7 +14,7 @@ use crate::evidence::Evidence;
 use crate::export::markdown::{self, address, code, folded, plain, row};
 use crate::export::sequence::Sequence;
 use crate::export::target::Target;
-use crate::graph::{Element, Existence, Graphs};
+use crate::graph::{Element, Existence};
 use crate::mission::Mission;
 use crate::mission::info::summary::{Most, described};
 use crate::mission::info::{Info, how_many, info};
@@ -64,8 +64,8 @@ fn report(sequence: &Sequence<'_>) -> String {
     out.push_str(&phases(mission, &times));
     out.push_str(&changes(mission, view, &times));
     out.push_str(&chart::chart(view));
-    out.push_str(&nodes(mission, view));
-    out.push_str(&topics(mission, view));
+    out.push_str(&nodes(mission, view, &info));
+    out.push_str(&topics(mission, view, &info));
     out.push_str(&evidence(mission, &info));
     out.push_str(&notices(sequence.notices));
     out
@@ -196,35 +196,9 @@ fn changes_of(mission: &Mission, frame: &Frame) -> String {
     plain(&described(mission, &events.collect::<Vec<_>>(), EACH_KIND))
 }
 
-/// The number of windows that contain an element, with its messages and the sum of its rates in them.
-#[derive(Default)]
-struct WindowsOf {
-    windows: usize,
-    messages: u64,
-    hz: f64,
-    rated: usize,
-}
-
-impl WindowsOf {
-    fn new(graphs: &Graphs, what: Element) -> Self {
-        let mut all = Self::default();
-        for (at, row) in graphs.rows(what) {
-            all.windows += 1;
-            all.messages += row.count.unwrap_or(0);
-            if let Some(hz) = row.hz(graphs.spans()[at]) {
-                all.hz += hz;
-                all.rated += 1;
-            }
-        }
-        all
-    }
-
-    fn mean(&self) -> String {
-        match self.rated {
-            0 => "–".to_owned(),
-            n => words::number(self.hz / n as f64),
-        }
-    }
+/// A rate in Hz; a dash for none.
+fn hz(hz: Option<f64>) -> String {
+    hz.map_or_else(|| "–".to_owned(), words::number)
 }
 
 fn seen(mission: &Mission, seen: &Existence) -> String {
@@ -250,40 +224,43 @@ fn shown(view: &View) -> BTreeSet<Element> {
 }
 
 /// Every node that is shown.
-fn nodes(mission: &Mission, view: &View) -> String {
+fn nodes(mission: &Mission, view: &View, info: &Info) -> String {
     let shown = shown(view);
     let all = mission.elements.nodes.with_ids();
     let all = all.filter(|(id, _)| shown.contains(&Element::Node(*id)));
     let rows = all.map(|(id, node)| {
-        let there = WindowsOf::new(&mission.graphs, Element::Node(id));
+        let own = info.nodes.iter().find(|own| own.name == node.name.as_str());
         row(&[
             code(node.name.as_str()),
             seen(mission, &node.seen),
-            there.windows.to_string(),
-            there.mean(),
+            mission.graphs.rows(Element::Node(id)).count().to_string(),
+            hz(own.and_then(|own| own.sent_hz)),
             known_by(node.seen.evidence),
         ])
     });
     let rows: Vec<String> = rows.collect();
-    let heads = ["Node", "Seen", "Windows", "Hz sent on average", "Known by"];
+    let heads = ["Node", "Seen", "Windows", "Hz while sending", "Known by"];
     folded_table(&words::count(rows.len(), "node"), &heads, rows, MOST_TABLE)
 }
 
 /// Every topic that is shown.
-fn topics(mission: &Mission, view: &View) -> String {
+fn topics(mission: &Mission, view: &View, info: &Info) -> String {
     let shown = shown(view);
     let all = mission.elements.topics.with_ids();
     let all = all.filter(|(id, _)| shown.contains(&Element::Topic(*id)));
     let rows = all.map(|(id, topic)| {
-        let there = WindowsOf::new(&mission.graphs, Element::Topic(id));
+        let own = info
+            .topics
+            .iter()
+            .find(|own| own.name == topic.name.as_str());
         let types: Vec<String> = topic.types.iter().map(|t| code(t)).collect();
         row(&[
             code(topic.name.as_str()),
             types.join(", "),
             seen(mission, &topic.seen),
-            there.windows.to_string(),
-            there.messages.to_string(),
-            there.mean(),
+            mission.graphs.rows(Element::Topic(id)).count().to_string(),
+            own.map_or(0, |own| own.count).to_string(),
+            hz(own.and_then(|own| own.hz)),
             known_by(topic.seen.evidence),
         ])
     });
@@ -294,7 +271,7 @@ fn topics(mission: &Mission, view: &View) -> String {
         "Seen",
         "Windows",
         "Messages",
-        "Hz on average",
+        "Hz while sending",
         "Known by",
     ];
     folded_table(&words::count(rows.len(), "topic"), &heads, rows, MOST_TABLE)

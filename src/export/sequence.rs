@@ -8,6 +8,7 @@ pub use crate::draw::topic_timeline::Overview;
 use super::OneDrawing;
 use super::target::Target;
 use crate::base::notice::Notices;
+use crate::draw::figure::Latex;
 use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Picture, Union};
 use crate::draw::scene::Scene;
@@ -116,7 +117,7 @@ pub struct Sequence<'a> {
     /// The film strip, for outputs with all windows in one drawing.
     pub strip: Option<&'a Scene>,
     /// The LaTeX code that includes the figure, if there is one.
-    pub latex: Option<&'a str>,
+    pub latex: Option<&'a Latex>,
     /// The options of the sequence.
     pub options: SequenceOptions,
 }

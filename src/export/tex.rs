@@ -13,7 +13,8 @@ pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<
     let Some(latex) = sequence.latex else {
         return Err(needs_figure(target));
     };
-    one_text(target, || latex.to_owned())
+    let text = latex.file(target.path());
+    one_text(target, move || text)
 }
 
 /// The error for `LaTeX` code without a figure.

@@ -343,7 +343,12 @@ fn topic(seen: &[TopicIn<'_>], times: &Times, is_optional: bool) -> Line {
     let rates: Vec<Vec<Rate>> = seen.iter().map(judged).collect();
     let is_rated = rates.iter().all(|own| !own.is_empty());
     let is_even = rates.iter().all(|own| Rate::are_even(own));
-    let hz = band(&rates.concat(), is_even).filter(|_| is_rated);
+    let pauses = seen.iter().filter_map(|s| {
+        let longest = s.facts.longest_of(s.id, true)?;
+        Some(longest as f64 / s.facts.mission.period.nanos().max(1) as f64)
+    });
+    let pause = pauses.fold(0.0, f64::max);
+    let hz = band(&rates.concat(), is_even, pause).filter(|_| is_rated);
     let is_latched = seen.iter().all(|s| s.facts.is_latched(s.id) == Some(true));
     // Messages sent once, on request or for late subscribers, have no times of their own.
     let is_many = |s: &TopicIn<'_>| s.facts.messages(s.id) >= FEWEST_OF_MEAN;
@@ -457,8 +462,9 @@ fn longest(seen: &[TopicIn<'_>], may_end: bool) -> Option<i64> {
 }
 
 /// The range around the median rate that covers noise and every window seen; `None` for bursty topics, where it would
-/// cover everything. The count of an uneven topic may differ by its square root.
-fn band(rates: &[Rate], is_even: bool) -> Option<Range> {
+/// cover everything. The count of an uneven topic may differ by its square root, and the longest pause, a share of a window,
+/// may lie in one window as well as in two.
+fn band(rates: &[Rate], is_even: bool, pause: f64) -> Option<Range> {
     let count = Rate::count(rates);
     let mut values: Vec<f64> = rates.iter().map(Rate::hz).collect();
     values.sort_by(f64::total_cmp);
@@ -477,6 +483,9 @@ fn band(rates: &[Rate], is_even: bool) -> Option<Range> {
     let chance = libm::sqrt(median * typical);
     let spread = libm::sqrt(variance).max(if is_even { 0.0 } else { chance });
     let margin = (median * SHARE).max(spread * SPREADS);
+    let seconds = rates.iter().map(Rate::seconds).fold(0.0, f64::max);
+    let missed = median * (pause - 1.0 / (median * seconds)).max(0.0);
+    let least = least.min(median - missed);
     let (from, to) = ((median - margin).min(least), (median + margin).max(most));
     (from > 0.0).then(|| Range {
         from: Some(rounded(from, libm::floor)),
@@ -636,7 +645,7 @@ mod tests {
     }
 
     fn band_of(counts: &[u64], is_even: bool) -> Option<String> {
-        band(&rates(counts), is_even).map(|range| range.to_string())
+        band(&rates(counts), is_even, 0.0).map(|range| range.to_string())
     }
 
     #[test]

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::facts::{Facts, Rate, Role, TopicIn};
 use super::values::Pattern;
-use crate::base::rhythm::{CLOSING_NS, FEWEST, FEWEST_OF_MEAN};
+use crate::base::rhythm::{CLOSING_NS, DISCOVERY_NS, FEWEST, FEWEST_OF_MEAN};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::graph::history::Bound;
@@ -81,6 +81,9 @@ pub struct Difference {
     pub first: String,
     /// The value in the second mission; empty for none.
     pub second: String,
+    /// Both rates in messages per second, of a difference in them.
+    #[serde(skip)]
+    pub(crate) rates: Option<[f64; 2]>,
     /// Whether it is observable in both missions. An element without evidence in one is not absent from it.
     #[serde(rename = "known")]
     pub is_known: bool,
@@ -114,6 +117,7 @@ impl Difference {
             side: Where::Both,
             first,
             second,
+            rates: None,
             is_known: true,
         }
     }
@@ -249,9 +253,16 @@ fn node(name: &str, both: [Role<'_>; 2], all: &mut Vec<Difference>) {
         let doubt = end.latest.since(end.earliest);
         doubt <= CLOSING_NS || doubt.saturating_mul(DOUBTS) <= rest
     };
+    // The other one may have ended, too, if it sends nothing from then on.
+    let sends_on = |side: usize, end: Bound| {
+        let [ended, other] = [both[1 - side], both[side]];
+        let at = ended.facts.mission.offset(end.time);
+        let last = other.facts.last_sent(other.nodes);
+        last.is_none_or(|last| other.facts.mission.offset(last) - at > tolerance(0, at))
+    };
     let has_ended = match ends {
-        [Some(end), None] => is_over(0, end),
-        [None, Some(end)] => is_over(1, end),
+        [Some(end), None] => is_over(0, end) && sends_on(1, end),
+        [None, Some(end)] => is_over(1, end) && sends_on(0, end),
         _ => false,
     };
     if has_ended {
@@ -331,8 +342,24 @@ fn rate(name: &str, both: [TopicIn<'_>; 2], rate_change: f64) -> Option<Differen
         let change = rate_change.max(UNEVEN_CHANGE);
         is_enough.then(|| apart(whole.map(|r| mean(&[r])), change))?
     });
-    let rates = different?.map(|mean| words::rate(mean.hz));
-    Some(Difference::changed("rate", name, rates))
+    different?;
+    let sending = both.map(|own| own.facts.while_sending(own.id));
+    let whole = both.map(|own| Some(own.facts.mean(own.id)?.hz()));
+    // The number that differs.
+    let differs =
+        |[first, second]: [f64; 2]| (first - second).abs() > rate_change * first.min(second);
+    let known = [(sending, "while sending"), (whole, "over the recording")];
+    let mut known = known
+        .iter()
+        .filter_map(|([a, b], word)| Some(([(*a)?, (*b)?], *word)));
+    let first = known.clone().find(|(rates, _)| differs(*rates));
+    let (rates, word) = first.or_else(|| known.next_back())?;
+    let texts = rates.map(words::rate);
+    let texts = [texts[0].clone(), format!("{} {word}", texts[1])];
+    Some(Difference {
+        rates: Some(rates),
+        ..Difference::changed("rate", name, texts)
+    })
 }
 
 /// The mean rate of a topic.
@@ -403,6 +430,8 @@ struct NamedEvent {
     /// The time as text for people.
     clock: String,
     moment: Moment,
+    /// Whether it is listed separately: in the other run it may be a part of another event.
+    is_headline: bool,
     /// Whether it is the silence of a robot's shutdown at the very end.
     is_closing: bool,
 }
@@ -423,6 +452,8 @@ fn events(facts: &[Facts<'_>; 2]) -> Vec<Difference> {
     let mut shift = 0;
     for one in first {
         if let Some(other) = places.get(&one.key)
+            && one.is_headline
+            && other.is_headline
             && is_moved([one.moment, other.moment], &mut shift)
         {
             let clocks = [&one.clock, &other.clock];
@@ -435,12 +466,13 @@ fn events(facts: &[Facts<'_>; 2]) -> Vec<Difference> {
     all
 }
 
-/// The headlines that two runs can have in common.
+/// The events that two runs can have in common.
 fn named_events(facts: &Facts<'_>) -> Vec<NamedEvent> {
     let mission = facts.mission;
     let mut many: BTreeMap<(Kind, &str), usize> = BTreeMap::new();
     let mut all = Vec::new();
-    for (_, event) in mission.log.headlines(mission.span) {
+    let events = mission.log.inside(mission.span).map(|(_, event)| event);
+    for event in events.filter(|event| !event.quiet) {
         let Some(name) = about(facts, event) else {
             continue;
         };
@@ -457,6 +489,7 @@ fn named_events(facts: &Facts<'_>) -> Vec<NamedEvent> {
                 at: mission.offset(event.time),
                 doubt: event.latest.since(event.earliest),
             },
+            is_headline: event.is_headline(),
             is_closing: mission.span.end.since(event.time) <= CLOSING_NS,
         });
     }
@@ -480,7 +513,8 @@ fn only(own: &[NamedEvent], other: &[NamedEvent], side: Where) -> Vec<Difference
     let wanted = [Kind::HandedOver, Kind::Silent, Kind::Lifecycle];
     let alone = own.iter().filter(|t| {
         // Silence at the very end is due to the robot's shutdown, if the other recording lasts that long.
-        wanted.contains(&t.key.kind) && !known.contains(&t.key) && !t.is_closing
+        let is_shown = t.is_headline && wanted.contains(&t.key.kind) && !t.is_closing;
+        is_shown && !known.contains(&t.key)
     });
     let differences = alone.map(|t| Difference {
         element: t.key.name.clone(),
@@ -567,13 +601,16 @@ impl<'a> Sent<'a> {
         })
     }
 
-    /// The difference in the first message.
+    /// The difference in the first message. One at the start of the second recording shows nothing of the time before it.
     fn begin(&self, shift: &mut i64) -> Option<Difference> {
         let starts = self.received.map(|span| span.start);
         let moments = [0, 1].map(|side| Moment {
             at: self.facts[side].mission.offset(starts[side]),
             doubt: self.doubt / 2,
         });
+        if moments[1].at <= DISCOVERY_NS {
+            return None;
+        }
         let clocks = [0, 1].map(|side| self.facts[side].clock(starts[side]));
         is_moved(moments, shift).then(|| Difference::changed("begin", self.name, clocks))
     }

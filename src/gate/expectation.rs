@@ -61,7 +61,7 @@ pub(crate) enum Demand {
     Nodes(Vec<At<Pattern>>, Box<Entry>),
     /// Facts of a topic.
     Topic(At<Pattern>, Box<Entry>),
-    /// The range of the number of reconfigurations.
+    /// The range of the number of changes.
     Changes { during: During, many: Range },
 }
 

@@ -15,6 +15,7 @@ use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::{Bound, Sending};
 use crate::graph::{ById, EdgeId, Element, NodeId, PerElement, Row, State, TopicId, Wiring};
 use crate::mission::event_log::{Event, Kind};
+use crate::mission::rates::Rates;
 use crate::mission::{Mission, Window};
 
 /// A mission with precomputed facts.
@@ -31,6 +32,7 @@ pub(crate) struct Facts<'a> {
     /// The role of each of them.
     names: BTreeMap<&'a str, &'a str>,
     wiring: Wiring,
+    rates: Rates<'a>,
 }
 
 /// A role of a mission and its nodes.
@@ -113,6 +115,9 @@ const STARTING: [&str; 1] = ["parameter_events"];
 /// Evidence that lists all subscribers of a topic.
 const LISTING: [&str; 4] = ["rosgraph", "discovery", "statistics", "topic_statistics"];
 
+/// The events that take messages away.
+pub(crate) const ENDS: &[Kind] = &[Kind::Stopped, Kind::Restarted, Kind::Silent];
+
 /// Whether an element was observed, not only declared.
 fn is_seen(evidence: Evidence) -> bool {
     !evidence.is_guess() && evidence.words().any(|word| !DECLARING.contains(&word))
@@ -135,7 +140,7 @@ pub(crate) struct Rate {
 }
 
 impl Rate {
-    fn seconds(&self) -> f64 {
+    pub(crate) fn seconds(&self) -> f64 {
         self.span.nanos().max(1) as f64 / 1e9
     }
 
@@ -199,6 +204,7 @@ impl<'a> Facts<'a> {
             roles,
             names,
             wiring: elements.wiring(|_, _| true),
+            rates: Rates::new(mission),
         }
     }
 
@@ -567,6 +573,19 @@ impl<'a> Facts<'a> {
         })
     }
 
+    /// The rate of a topic while it is sent, without its pauses.
+    pub(crate) fn while_sending(&self, topic: TopicId) -> Option<f64> {
+        self.rates.while_sending(&self.rates.of_topic(topic))
+    }
+
+    /// The time of the last message of these nodes that is not housekeeping.
+    pub(crate) fn last_sent(&self, nodes: &[NodeId]) -> Option<Stamp> {
+        let senders = self.mission.sending.senders.iter().filter(|sender| {
+            sender.node.is_some_and(|id| nodes.contains(&id)) && !self.is_housekeeping(sender.topic)
+        });
+        Some(Sending::bounds(senders)?.1)
+    }
+
     /// The part of a window in which a topic with messages in `received` counts; `None` if it is too short.
     fn counted(&self, window: Span, received: Span, may_end: bool) -> Option<Span> {
         let whole = self.mission.span;
@@ -641,9 +660,14 @@ impl<'a> Facts<'a> {
         pauses.into_iter().flatten().copied()
     }
 
-    /// The cause in the event log for the change of a topic around a time: an event of its publishers, or of the nodes
-    /// that feed them.
-    pub(crate) fn cause_for_topic(&self, topic: TopicId, around: Span) -> Option<Cause> {
+    /// The cause in the event log for the change of a topic around a time: an event of one of these `kinds` of its publishers,
+    /// or of the nodes that feed them.
+    pub(crate) fn cause_for_topic(
+        &self,
+        topic: TopicId,
+        kinds: &[Kind],
+        around: Span,
+    ) -> Option<Cause> {
         let direct: BTreeSet<NodeId> = self.publishers(topic).iter().map(|p| p.node).collect();
         let fed = direct
             .iter()
@@ -655,15 +679,19 @@ impl<'a> Facts<'a> {
             .map(|p| p.node)
             .filter(|node| !direct.contains(node))
             .collect();
-        self.cause(&direct, around)
-            .or_else(|| self.cause(&feeders, around))
+        self.cause(&direct, kinds, around)
+            .or_else(|| self.cause(&feeders, kinds, around))
     }
 
-    /// The first event of one of these nodes in a time range.
-    pub(crate) fn cause(&self, nodes: &BTreeSet<NodeId>, around: Span) -> Option<Cause> {
-        let wanted = [Kind::Stopped, Kind::Restarted, Kind::Silent];
+    /// The first event of these `kinds` of one of these nodes in a time range.
+    pub(crate) fn cause(
+        &self,
+        nodes: &BTreeSet<NodeId>,
+        kinds: &[Kind],
+        around: Span,
+    ) -> Option<Cause> {
         let events = self.mission.log.inside(around).map(|(_, event)| event);
-        let mut events = events.filter(|e| wanted.contains(&e.kind));
+        let mut events = events.filter(|e| kinds.contains(&e.kind));
         let event = events.find(|e| matches!(e.what, Element::Node(id) if nodes.contains(&id)))?;
         self.mission.elements.ends(event.what).0.map(|node| Cause {
             time: Some(event.time),

@@ -120,7 +120,7 @@ kinds! {
         "`to: [/a]` names some of them. Undecidable unless the bag lists subscribers: by `/rosgraph`, statistics, \
          discovery, or this node's log of its connections.";
     TooManyChanges "too-many-changes" "" "":
-        "There were more, or fewer, reconfigurations than allowed.",
+        "There were more, or fewer, changes than allowed.",
         "`during: -30s.., changes: ..0` counts the events that `bagreel events` prints.";
     UnexpectedNode "unexpected-node" "" "new":
         "A node in the bag is not in the file.",

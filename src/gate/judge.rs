@@ -308,7 +308,7 @@ impl Judge<'_> {
         if many.holds(events.len() as f64) {
             return None;
         }
-        let seen = words::count(events.len(), "reconfiguration");
+        let seen = words::count(events.len(), "change");
         let [from, to] = [span.start, span.end].map(|time| self.facts.clock(time));
         let text = format!("{seen} from {from} to {to}, expected {many}");
         let parts = self.facts.mission.log.all_parts();
@@ -318,7 +318,7 @@ impl Judge<'_> {
         });
         let rest = events.len().saturating_sub(MOST_LISTED);
         let rest = (rest > 0).then(|| format!("and {rest} more"));
-        let finding = Finding::new(FindingKind::TooManyChanges, "reconfigurations", at, text)
+        let finding = Finding::new(FindingKind::TooManyChanges, "changes", at, text)
             .saw(events.len(), words::count_range(many.from, many.to))
             .at(span)
             .details(listed.chain(rest));

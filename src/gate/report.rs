@@ -5,7 +5,9 @@ mod differences;
 mod summary;
 mod text;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+
+pub(crate) use data::unchecked;
 
 use super::difference::{DiffSubject, Difference};
 use super::finding::{Finding, FindingKind, KINDS, Severity};
@@ -144,12 +146,15 @@ impl Subject<'_> {
         }
     }
 
-    /// The command that accepts the findings about a name; all findings without one.
-    fn accept(&self, name: Option<&str>) -> String {
+    /// The command that accepts the findings about these names; all findings without one.
+    fn accept(&self, names: &BTreeSet<&str>) -> String {
         let bags: Vec<String> = self.bags.iter().map(|bag| quoted(bag)).collect();
-        let only = name.map_or_else(String::new, |name| format!(" --only {}", quoted(name)));
+        let only = names.iter().map(|name| format!(" --only {}", quoted(name)));
         let (bags, file) = (bags.join(" "), quoted(&self.file));
-        format!("bagreel baseline {bags} --update {file}{only}")
+        format!(
+            "bagreel baseline {bags} --update {file}{}",
+            only.collect::<String>()
+        )
     }
 }
 

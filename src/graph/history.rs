@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{ById, Element, Elements, Graphs, NodeId, State, TopicId};
 use crate::base::rhythm::{
-    ALIKE, FEWEST, LONGER, OFTEN, SAME_RATE, STEADY, STEADY_NS, broken_after,
+    ALIKE, FEWEST, GONE_NS, LONGER, OFTEN, SAME_RATE, STEADY, STEADY_NS, broken_after,
 };
 use crate::base::time::{Span, Stamp};
 
@@ -268,6 +268,17 @@ pub(crate) fn begins_steadily(stretches: &[Stretch]) -> bool {
         || count >= STEADY && last.since(first.first) >= STEADY_NS
 }
 
+/// The number of stretches before a sender's rhythm begins: stray messages, fewer than show a rhythm, such as one zero command
+/// when a node starts.
+pub(crate) fn strays(stretches: &[Stretch]) -> usize {
+    let mut count = 0;
+    let is_stray = |s: &&Stretch| {
+        count += s.count;
+        count < FEWEST
+    };
+    stretches.iter().take_while(is_stray).count()
+}
+
 /// A transition of a node to a lifecycle state.
 pub(crate) struct Transition {
     pub(crate) node: NodeId,
@@ -300,19 +311,30 @@ pub(crate) fn silences(stretches: &[Stretch], lives: &[Span], pauses: &[Span]) -
     for life in lives {
         let inside = |s: &&Stretch| life.start <= s.first && s.first < life.end;
         let own: Vec<&Stretch> = stretches.iter().filter(inside).collect();
-        let mut longest = 0;
+        let mut count = 0;
+        // The two longest pauses so far: a single one is not a habit.
+        let mut longest = [0; 2];
         for (at, stretch) in own.iter().enumerate() {
             let next = own.get(at + 1).map(|next| next.first);
             if hide(pauses, (stretch.last, next)) {
                 continue;
             }
             let silence = next.unwrap_or(life.end).since(stretch.last);
-            let usual = broken_after(stretch.period).max(LONGER.saturating_mul(longest));
+            let usual = broken_after(stretch.period).max(LONGER.saturating_mul(longest[1]));
             let comparable = gaps
                 .iter()
                 .filter(|gap| gap.saturating_mul(LONGER) >= silence);
-            let long = silence > usual && comparable.count() <= ALIKE;
-            longest = longest.max(silence);
+            // After a pause, a short silence to the end may be another one.
+            let is_open = next.is_none() && longest[0] > 0;
+            let least = usual.max(if is_open { GONE_NS } else { 0 });
+            let long = silence > least && comparable.count() <= ALIKE;
+            count += stretch.count;
+            if count >= FEWEST {
+                longest = [
+                    longest[0].max(silence),
+                    longest[1].max(silence.min(longest[0])),
+                ];
+            }
             if stretch.is_even && stretch.count >= FEWEST && long {
                 found.push((stretch.last, next));
             }

@@ -24,12 +24,13 @@ pub use why::why;
 
 use crate::bag::Report;
 use crate::base::name::is_recorder;
-use crate::base::time::Stamp;
 use crate::base::words::visible_json;
 use crate::evidence::{Confidence, Evidence};
-use crate::graph::history::Sending;
+use crate::graph::history::{Sender, Sending};
 use crate::graph::{ById, Edge, EdgeId, Element, NodeId, TopicId, mean_rate};
 use crate::mission::Mission;
+use crate::mission::event_log::Kind;
+use crate::mission::rates::Rates;
 
 /// The output of `bagreel info` for one mission. Written as JSON with these names.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -60,6 +61,8 @@ pub struct Info {
     pub topics_without_subscriber: usize,
     /// Each kind of evidence found, with the number of elements that it supports.
     pub evidence: Vec<EvidenceInfo>,
+    /// The number of changes by kind.
+    pub changes: ChangeCounts,
     /// Topics, sorted by name.
     pub topics: Vec<TopicInfo>,
     /// Nodes, sorted by name.
@@ -82,6 +85,36 @@ pub struct ConfidenceCounts {
     pub stated: usize,
     pub inferred: usize,
     pub declared: usize,
+}
+
+/// The numbers of changes in the event log, as far as they are listed separately.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct ChangeCounts {
+    /// All of them.
+    pub all: usize,
+    /// Nodes that started, topics and connections that appeared.
+    pub starts: usize,
+    /// Nodes that stopped, topics and connections that vanished.
+    pub stops: usize,
+    /// Nodes that restarted.
+    pub restarts: usize,
+    /// Rates that changed.
+    pub rates: usize,
+}
+
+impl ChangeCounts {
+    fn of(mission: &Mission) -> Self {
+        let kinds = mission.log.headlines(mission.span).map(|(_, e)| e.kind);
+        let kinds: Vec<Kind> = kinds.collect();
+        let of = |wanted: &[Kind]| kinds.iter().filter(|kind| wanted.contains(kind)).count();
+        Self {
+            all: kinds.len(),
+            starts: of(&[Kind::Started, Kind::Appeared]),
+            stops: of(&[Kind::Stopped, Kind::Vanished]),
+            restarts: of(&[Kind::Restarted]),
+            rates: of(&[Kind::Rate]),
+        }
+    }
 }
 
 impl ConfidenceCounts {
@@ -132,8 +165,10 @@ pub struct TopicInfo {
     pub types: Vec<String>,
     /// The number of messages.
     pub count: u64,
-    /// Messages per second from the first message to the last; `None` with fewer than two messages.
+    /// Messages per second while sending: pauses are left out; `None` with fewer than two messages.
     pub hz: Option<f64>,
+    /// Messages per second over the recording: from the first message to the last, pauses included; `None` with fewer than two.
+    pub mean_hz: Option<f64>,
     /// The number of payload bytes, if known.
     pub bytes: Option<u64>,
     /// The publishers.
@@ -170,11 +205,11 @@ pub struct NodeInfo {
     pub subscribes: usize,
     /// The number of messages that it sent, if publishers are known.
     pub sent: Option<u64>,
-    /// The messages that it sent per second from the first to the last; `None` for fewer than two.
+    /// The messages that it sent per second while sending; `None` for fewer than two.
     pub sent_hz: Option<f64>,
     /// The number of messages on topics that it is known to subscribe to; `None` if there are none.
     pub received: Option<u64>,
-    /// These messages per second from the first to the last; `None` for fewer than two.
+    /// These messages per second while they were sent; `None` for fewer than two.
     pub received_hz: Option<f64>,
 }
 
@@ -187,7 +222,8 @@ pub fn info(mission: &Mission) -> Info {
         let known = own.filter(|(what, _)| !elements.evidence(*what).is_guess());
         known.map(|(_, confidence)| *confidence).collect()
     };
-    let topics = topics(mission);
+    let rates = Rates::new(mission);
+    let topics = topics(mission, &rates);
     let traffic = traffic(mission, &topics);
     let named = elements.nodes.with_ids();
     let named = named.filter(|(_, node)| !is_unnamed(node.seen.evidence));
@@ -203,9 +239,9 @@ pub fn info(mission: &Mission) -> Info {
             publishes: own.publishes,
             subscribes: own.subscribes,
             sent: own.sent,
-            sent_hz: own.sent.and_then(|n| mean_rate(n, own.sending?)),
+            sent_hz: rates.while_sending(&own.sending),
             received: own.received,
-            received_hz: own.received.and_then(|n| mean_rate(n, own.receiving?)),
+            received_hz: rates.while_sending(&own.receiving),
         }
     });
     let mut info = Info {
@@ -225,6 +261,7 @@ pub fn info(mission: &Mission) -> Info {
         topics_without_publisher: lacking(&topics, &mut elements.publishes.iter()),
         topics_without_subscriber: lacking(&topics, &mut listeners(mission).map(|(_, edge)| edge)),
         evidence: evidence(mission),
+        changes: ChangeCounts::of(mission),
         nodes: nodes.collect(),
         topics: topics.into_iter().collect(),
         advice: Vec::new(),
@@ -278,30 +315,24 @@ fn lacking(topics: &ById<TopicId, TopicInfo>, edges: &mut dyn Iterator<Item = &E
     with_messages.filter(|(id, _)| !known.contains(id)).count()
 }
 
-/// The numbers of edges and messages of one node.
+/// The numbers of edges and messages of one node, and the senders of its messages, in and out, that have rates.
 #[derive(Clone, Default)]
-struct NodeTraffic {
+struct NodeTraffic<'a> {
     publishes: usize,
     subscribes: usize,
-    /// The number of messages sent, with the times of the first and the last; `None` where not known.
+    /// The number of messages sent; `None` where not known.
     sent: Option<u64>,
-    sending: Option<(Stamp, Stamp)>,
-    /// The number of messages received, with the times of the first and the last; `None` for a node without
-    /// subscriptions.
+    sending: Vec<&'a Sender>,
+    /// The number of messages received; `None` for a node without subscriptions.
     received: Option<u64>,
-    receiving: Option<(Stamp, Stamp)>,
-}
-
-/// Extends the time from a first message to a last one.
-fn widen(all: &mut Option<(Stamp, Stamp)>, other: Option<(Stamp, Stamp)>) {
-    if let Some((first, last)) = other {
-        let all = all.get_or_insert((first, last));
-        *all = (all.0.min(first), all.1.max(last));
-    }
+    receiving: Vec<&'a Sender>,
 }
 
 /// The traffic of every node, computed in one pass over the edges.
-fn traffic(mission: &Mission, topics: &ById<TopicId, TopicInfo>) -> ById<NodeId, NodeTraffic> {
+fn traffic<'a>(
+    mission: &'a Mission,
+    topics: &ById<TopicId, TopicInfo>,
+) -> ById<NodeId, NodeTraffic<'a>> {
     let elements = &mission.elements;
     let mut traffic = ById::like(&elements.nodes, NodeTraffic::default());
     for edge in &elements.publishes {
@@ -311,15 +342,13 @@ fn traffic(mission: &Mission, topics: &ById<TopicId, TopicInfo>) -> ById<NodeId,
         let own = &mut traffic[edge.node];
         own.subscribes += 1;
         *own.received.get_or_insert(0) += topics[edge.topic].count;
-        let of = mission.sending.of_topic(edge.topic);
-        widen(&mut own.receiving, Sending::bounds(of.iter()));
+        let of = mission.sending.of_topic(edge.topic).iter();
+        own.receiving.extend(of.filter(|sender| !sender.is_latched));
     }
-    for sender in &mission.sending.senders {
+    let senders = mission.sending.senders.iter();
+    for sender in senders.filter(|sender| !sender.is_latched) {
         if let Some(node) = sender.node {
-            widen(
-                &mut traffic[node].sending,
-                Sending::bounds([sender].into_iter()),
-            );
+            traffic[node].sending.push(sender);
         }
     }
     for (id, edge) in elements.publishes.with_ids() {
@@ -331,7 +360,7 @@ fn traffic(mission: &Mission, topics: &ById<TopicId, TopicInfo>) -> ById<NodeId,
     traffic
 }
 
-fn topics(mission: &Mission) -> ById<TopicId, TopicInfo> {
+fn topics(mission: &Mission, rates: &Rates<'_>) -> ById<TopicId, TopicInfo> {
     let elements = &mission.elements;
     let mut topics: ById<TopicId, TopicInfo> = elements
         .topics
@@ -342,6 +371,7 @@ fn topics(mission: &Mission) -> ById<TopicId, TopicInfo> {
             types: topic.types.iter().map(ToString::to_string).collect(),
             count: 0,
             hz: None,
+            mean_hz: None,
             bytes: None,
             publishers: Vec::new(),
             subscribers: Vec::new(),
@@ -361,7 +391,8 @@ fn topics(mission: &Mission) -> ById<TopicId, TopicInfo> {
             topic.activity[window] = count;
         }
         let bounds = Sending::bounds(mission.sending.of_topic(id).iter());
-        topic.hz = bounds.and_then(|bounds| mean_rate(topic.count, bounds));
+        topic.hz = rates.while_sending(&rates.of_topic(id));
+        topic.mean_hz = bounds.and_then(|bounds| mean_rate(topic.count, bounds));
     }
     let name = |node: NodeId| elements.nodes[node].name.to_string();
     let named = elements.publishes.iter();

@@ -1,4 +1,4 @@
-//! The rate of every sender over the mission, in pieces: a piece ends where the log tells another rate, or at a long silence.
+//! The rate of every sender over the mission, in pieces: a piece ends where the log has another rate, or at a long silence.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -88,6 +88,23 @@ impl<'a> Rates<'a> {
         summed(&rates, self.mission.span)
     }
 
+    /// The mean rate of some senders together while they send: their pauses are left out. `None` without two messages.
+    pub(crate) fn while_sending(&self, senders: &[&Sender]) -> Option<f64> {
+        if let [_] = senders {
+            return mean(&self.of(senders));
+        }
+        // Several that rarely send have no rates of their own, so their messages are counted.
+        let stretches = || senders.iter().flat_map(|sender| &sender.stretches);
+        let spans = stretches().map(|s| Span::new(s.first, s.last.plus(1)));
+        let spans = Span::joined(spans.collect(), silence(self.mission.span));
+        let nanos: i64 = spans.iter().map(|span| span.nanos() - 1).sum();
+        let intervals = stretches()
+            .map(|s| s.count)
+            .sum::<u64>()
+            .checked_sub(spans.len() as u64)?;
+        (nanos > 1_000_000 && intervals > 0).then(|| intervals as f64 * 1e9 / nanos as f64)
+    }
+
     /// The rates of a sender: its stretches, joined unless a step of the log or a long silence separates
     /// them.
     fn pieces(&self, sender: &Sender) -> Vec<Piece> {
@@ -117,7 +134,7 @@ impl<'a> Rates<'a> {
 }
 
 /// The mean rate over some pieces; `None` if they have no length.
-pub(crate) fn mean(pieces: &[Piece]) -> Option<f64> {
+fn mean(pieces: &[Piece]) -> Option<f64> {
     let seconds = |p: &Piece| (p.span.nanos() - 1) as f64 / 1e9;
     let time: f64 = pieces.iter().map(seconds).sum();
     let count: f64 = pieces.iter().map(|p| p.hz * seconds(p)).sum();

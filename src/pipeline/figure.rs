@@ -10,7 +10,7 @@ use crate::base::time::Stamp;
 use crate::base::words;
 use crate::draw::figure::page::{FigureSheet, nothing};
 use crate::draw::figure::steps::{StepPanel, graph_width};
-use crate::draw::figure::{self, Figure, FigureKind, graph, holders, steps};
+use crate::draw::figure::{self, Figure, FigureKind, Latex, graph, holders, steps};
 use crate::draw::picture::PageOptions;
 use crate::draw::scene::Scene;
 use crate::draw::timeline::canvas::PX_PER_MM;
@@ -46,7 +46,7 @@ pub(super) fn draw(
     options: &FigureOptions,
     outputs: &[Output],
     watch: &mut dyn Watch,
-) -> Result<(Figure, String)> {
+) -> Result<(Figure, Latex)> {
     let filters = (&drawing.view.ns_filter, &drawing.view.topic_filter);
     let source = FigureSource::new(mission, filters.0, filters.1, options.is_named);
     let sheet = FigureSheet::new(&source, &drawing.fonts, options);
@@ -60,18 +60,22 @@ pub(super) fn draw(
     let picture = outputs
         .iter()
         .find(|o| ["pdf", "png", "svg"].contains(&o.format.word))
-        .and_then(|o| o.target.path().file_name())
         .map_or_else(
-            || format!("{}.pdf", options.kind.word()),
-            |name| name.to_string_lossy().into_owned(),
+            || format!("{}.pdf", options.kind.word()).into(),
+            |output| output.target.path().to_owned(),
         );
     let is_special = |c: char| c.is_control() || "\\{}%#~^$&".contains(c);
-    if picture.contains(is_special) && outputs.iter().any(|o| o.format.word == "tex") {
-        let what = format!("LaTeX cannot include a file called `{picture}`");
+    let name = picture.display().to_string();
+    if name.contains(is_special) && outputs.iter().any(|o| o.format.word == "tex") {
+        let what = format!("LaTeX cannot include a file called `{name}`");
         let hint = "give the picture a name of letters, digits, `.`, `-` and `_`";
         return Err(Error::usage(what, hint));
     }
-    let latex = figure::latex(&drawn, &picture, options);
+    let latex = Latex {
+        picture,
+        caption: drawn.caption.clone(),
+        is_wide: options.width_mm > 120.0,
+    };
     Ok((drawn, latex))
 }
 

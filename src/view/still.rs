@@ -17,7 +17,7 @@ use crate::base::words;
 use crate::graph::history::Sender;
 use crate::graph::{ById, Element};
 use crate::mission::event_log::{Event, Kind};
-use crate::mission::rates::{Rates, mean, same};
+use crate::mission::rates::{Rates, same};
 use crate::mission::{EventId, Mission};
 
 /// The times at which a box of a still was there.
@@ -79,7 +79,7 @@ pub(super) fn still(mut view: View, mission: &Mission) -> View {
         ..Frame::empty(0, mission.span)
     };
     if !view.presences.is_empty() {
-        "under each node: when it ran".clone_into(&mut frame.note);
+        "under each node: when it ran; rates while sending".clone_into(&mut frame.note);
     }
     view.frames = vec![frame];
     view
@@ -111,7 +111,7 @@ impl StillRates<'_> {
         let mut steps: Vec<f64> = pieces.iter().map(|piece| piece.hz).collect();
         steps.dedup_by(|a, b| words::rate(*a) == words::rate(*b));
         steps.truncate(if steps.len() > 1 { steps.len() } else { 0 });
-        let mean = mean(&pieces)?;
+        let mean = self.0.while_sending(senders)?;
         let hz = hz.filter(|hz| same(*hz, mean)).unwrap_or(mean);
         Some((hz, steps))
     }

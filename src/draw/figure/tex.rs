@@ -1,6 +1,8 @@
 //! A figure for `LaTeX`: the code that includes it, and a caption that describes it.
 
-use super::{Figure, FigureKind, FigureOptions};
+use std::path::{Component, Path, PathBuf};
+
+use super::{FigureKind, FigureOptions};
 use crate::base::words;
 use crate::draw::timeline::drawer::clock;
 use crate::draw::timeline::phases::title;
@@ -95,20 +97,68 @@ fn escaped(text: &str) -> String {
     out
 }
 
-/// The file that includes `picture`, a file name.
-pub(crate) fn file(figure: &Figure, picture: &str, options: &FigureOptions) -> String {
-    let star = if options.width_mm > 120.0 { "*" } else { "" };
-    format!(
-        "% Written by bagreel. Needs \\usepackage{{graphicx}}.\n\\begin{{figure{star}}}[t]\n  \\centering\n  \
-         \\includegraphics{{{picture}}}\n  \\caption{{{}}}\n  \\label{{fig:{}}}\n\\end{{figure{star}}}\n",
-        figure.caption,
-        options.kind.word()
-    )
+/// The `LaTeX` code that includes a figure.
+#[derive(Clone, Debug)]
+pub struct Latex {
+    /// The file of the picture, as given.
+    pub(crate) picture: PathBuf,
+    pub(crate) caption: String,
+    /// Whether it is wider than a column.
+    pub(crate) is_wide: bool,
+}
+
+impl Latex {
+    /// The text of the file `tex`: the picture's path counts from its folder, and its name is the label.
+    pub(crate) fn file(&self, tex: &Path) -> String {
+        let star = if self.is_wide { "*" } else { "" };
+        let stem = tex.file_stem().unwrap_or_default().to_string_lossy();
+        let label: String = stem
+            .chars()
+            .map(|c| if c.is_alphanumeric() { c } else { '-' })
+            .collect();
+        format!(
+            "% Written by bagreel. Needs \\usepackage{{graphicx}}.\n\\begin{{figure{star}}}[t]\n  \\centering\n  \
+             \\includegraphics{{{}}}\n  \\caption{{{}}}\n  \\label{{fig:{label}}}\n\\end{{figure{star}}}\n",
+            relative(&self.picture, tex.parent().unwrap_or(Path::new(""))),
+            self.caption,
+        )
+    }
+}
+
+/// A path counted from a folder, both from the same place; absolute if one of them is, or if the folder is above that place.
+fn relative(path: &Path, folder: &Path) -> String {
+    let (mut own, mut steps) = (path.components().peekable(), folder.components().peekable());
+    while own.peek().is_some() && own.peek() == steps.peek() {
+        own.next();
+        steps.next();
+    }
+    let is_near = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
+    let path = if steps.clone().all(is_near) {
+        let up = steps
+            .filter(|part| *part != Component::CurDir)
+            .map(|_| "..");
+        up.map(Path::new)
+            .map(Path::as_os_str)
+            .chain(own.map(Component::as_os_str))
+            .collect()
+    } else {
+        std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+    };
+    path.display().to_string().replace('\\', "/")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pictures_are_found_from_the_folder_of_the_text() {
+        let from = |picture: &str, folder: &str| relative(Path::new(picture), Path::new(folder));
+        assert_eq!(from("fig/a.pdf", "fig"), "a.pdf");
+        assert_eq!(from("fig/a.pdf", ""), "fig/a.pdf");
+        assert_eq!(from("fig/a.pdf", "text/parts"), "../../fig/a.pdf");
+        assert_eq!(from("./a.pdf", "./text"), "../a.pdf");
+    }
 
     #[test]
     fn names_are_escaped_for_latex() {

@@ -80,6 +80,8 @@ pub(crate) fn signs(timeline: &Timeline) -> Vec<Unbroken> {
     let sends = open.iter().any(|row| !row.bars.is_empty());
     let words = "publishes (height: share of the row’s maximum)";
     add(sends, (LONG, bar), words);
+    let is_rated = sends && timeline.rows.iter().any(|row| row.hz.is_some());
+    add(is_rated, (0.0, |_, _, _| ()), "Hz: while sending");
     let is_silent = open.iter().any(is_silent);
     add(is_silent, (LONG, |c, x, y| line(c, x, y, &[])), "silent");
     let is_inferred = open.iter().any(|row| row.is_inferred);

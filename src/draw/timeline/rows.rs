@@ -11,7 +11,7 @@ use crate::base::time::{Span, Stamp};
 use crate::evidence::Confidence;
 use crate::graph::history::Sender;
 use crate::graph::{ById, EdgeId, Element, NodeId, TopicId};
-use crate::mission::rates::{Piece, Rates, mean, silence};
+use crate::mission::rates::{Piece, Rates, silence};
 
 /// An interval of publishing at one rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -161,7 +161,7 @@ fn row(
     let lives = Span::joined(lives.collect(), 0);
     let confidence = elements.iter().map(|what| source.confidence(*what)).min();
     let pieces = rates.of(senders);
-    let hz = mean(&pieces);
+    let hz = rates.while_sending(senders);
     let most = pieces.iter().map(|piece| piece.hz).fold(0.0, f64::max);
     let share = |hz: f64| if most > 0.0 { hz / most } else { 1.0 };
     let bar = |piece: &Piece| SendingBar::new(piece.span, share(piece.hz));
@@ -186,7 +186,7 @@ fn row(
 fn sent_by<'s>(source: &'s FigureSource<'_>, rates: &Rates<'_>, edges: &[EdgeId]) -> Vec<&'s str> {
     let sent = |edge: &EdgeId| {
         let topic = source.mission.elements.publishes.get(*edge)?.topic;
-        let hz = mean(&rates.of(&rates.senders(&[*edge])));
+        let hz = rates.while_sending(&rates.senders(&[*edge]));
         (!source.is_hub(topic)).then_some((hz.unwrap_or(0.0), source.topic(topic)))
     };
     let mut all: Vec<(f64, &str)> = edges.iter().filter_map(sent).collect();

@@ -11,6 +11,8 @@ pub(crate) struct LogRecord<'a> {
     /// The full name of the node, or of the logger, which is a node or a part of one.
     pub(crate) logger: String,
     pub(crate) text: &'a str,
+    /// `logs`, or for a warning or an error `logs WARN`, `logs ERROR` or `logs FATAL`.
+    pub(crate) logs: &'static str,
     /// The path of the source file as recorded by the compiler or interpreter.
     pub(crate) file: &'a str,
     /// The number of the record among those of its node; `None` in ROS 2.
@@ -36,7 +38,7 @@ impl<'a> LogRecord<'a> {
             payload.time()?;
             None
         };
-        payload.u8()?;
+        let level = payload.u8()?;
         let name = payload.string()?;
         let logger = if is_ros1 || name.is_empty() {
             name.to_owned()
@@ -54,6 +56,12 @@ impl<'a> LogRecord<'a> {
             name,
             logger,
             text,
+            logs: match (is_ros1, level) {
+                (true, 4) | (false, 30) => "logs WARN",
+                (true, 8) | (false, 40) => "logs ERROR",
+                (true, 16) | (false, 50) => "logs FATAL",
+                _ => "logs",
+            },
             file,
             number,
             topics,

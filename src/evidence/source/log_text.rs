@@ -41,7 +41,7 @@ pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
             Observation::Starved(node, of, policy)
         };
         context.states(observation, || {
-            format!("{} logs: {}", record.logger, record.text)
+            format!("{} {}: {}", record.logger, record.logs, record.text)
         });
     }
 }
@@ -154,7 +154,7 @@ pub(crate) fn read_duplicates(context: &mut SourceContext<'_>, record: &LogRecor
     if let Some(node) = doubled(record) {
         let node = context.name(&node);
         context.states(Observation::Duplicate(node), || {
-            format!("{} logs: {}", record.logger, record.text)
+            format!("{} {}: {}", record.logger, record.logs, record.text)
         });
     }
 }

@@ -15,12 +15,12 @@ use crate::evidence::observation::{Confidence, Name, Observation, Observations, 
 use crate::evidence::source::SourceContext;
 
 pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
-    let (name, text) = (record.name, record.text);
+    let (name, text, verb) = (record.name, record.text, record.logs);
     if name.is_empty() {
         return;
     }
     let node = context.name(name);
-    let logs = || format!("{name} logs: {text}");
+    let logs = || format!("{name} {verb}: {text}");
     context.states(Observation::Node(node), logs);
     let log = context.stream.topic;
     if is_log(context.stream.connection.topic.as_str()) {
@@ -205,7 +205,7 @@ pub(crate) fn read_ros2(context: &mut SourceContext<'_>, record: &LogRecord<'_>)
     let logger = context.name(&record.logger);
     let topic = context.stream.topic;
     context.states(Observation::Logger(logger, topic), || {
-        format!("logger {}: {}", record.name, record.text)
+        format!("{} {}: {}", record.logger, record.logs, record.text)
     });
 }
 

@@ -12,7 +12,7 @@ use crate::draw::timeline::Timeline;
 use crate::draw::timeline::rows::{Level, Row, of_nodes, of_topics};
 use crate::draw::timeline::source::FigureSource;
 use crate::evidence::{Confidence, Evidence};
-use crate::gate::facts::{Facts, Peer, Rate, TopicIn};
+use crate::gate::facts::{Facts, Peer, TopicIn};
 use crate::gate::values::Pattern;
 use crate::graph::history::Sending;
 use crate::graph::{
@@ -98,13 +98,11 @@ fn side_of(mission: &Mission) -> MissionSide {
             let (node, topic) = ends(peer);
             side.insert(Key::Subscribe(topic, node), peer.into());
         }
-        let rates = own.rates(true);
-        let nanos: i64 = rates.iter().map(|r| r.span.nanos()).sum();
         let topic = Known {
             evidence: elements.topics[id].seen.evidence,
             types: own.types(),
             count: Some(facts.messages(id)),
-            hz: (nanos > 0).then(|| Rate::mean_hz(&rates)),
+            hz: facts.while_sending(id),
             ..Known::default()
         };
         side.insert(Key::Topic(name), topic);
@@ -153,7 +151,6 @@ pub(crate) fn union(
     let graphs = graphs.collect();
     let start = windows.first().map_or(AT, |w| w.span.start);
     let events = UnionLog {
-        sides: [&a, &b],
         elements: &elements,
         differing,
         turned: turned(differing),
@@ -254,7 +251,6 @@ fn graph(elements: &Elements, side: &MissionSide) -> Graph {
 
 /// The log under construction.
 struct UnionLog<'a> {
-    sides: [&'a MissionSide; 2],
     elements: &'a Elements,
     differing: &'a [Difference],
     turned: Turned<'a>,
@@ -338,31 +334,7 @@ impl UnionLog<'_> {
             _ => return,
         };
         if let (Some(what), true) = (what, difference.is_known) {
-            self.add(kind, what, self.values(difference), None);
-        }
-    }
-
-    /// The different values.
-    fn values(&self, difference: &Difference) -> Detail {
-        let topic = Key::Topic(difference.element.clone());
-        let topics = self.sides.map(|side| side.get(&topic));
-        if let ("rate", [Some(from_hz), Some(to_hz)]) =
-            (difference.kind, topics.map(|topic| topic?.hz))
-        {
-            return Detail::Rates { from_hz, to_hz };
-        }
-        let event = difference.name.strip_prefix(&*difference.element);
-        let of = |value: &str| match (difference.kind, value.parse::<usize>()) {
-            ("restarts", Ok(n)) => words::count(n, "restart").into(),
-            ("messages", Ok(n)) => words::count(n, "message").into(),
-            ("event", _) if value.is_empty() => "no such event".into(),
-            ("begin", _) => format!("begins at {value}").into(),
-            ("event" | "time", _) => format!("{} {value}", event.unwrap_or("").trim()).into(),
-            _ => value.into(),
-        };
-        Detail::Values {
-            from: of(&difference.first),
-            to: of(&difference.second),
+            self.add(kind, what, values(difference), None);
         }
     }
 
@@ -387,6 +359,26 @@ impl UnionLog<'_> {
             quiet: false,
             weight: 1,
         })
+    }
+}
+
+/// The different values.
+fn values(difference: &Difference) -> Detail {
+    if let Some([from_hz, to_hz]) = difference.rates {
+        return Detail::Rates { from_hz, to_hz };
+    }
+    let event = difference.name.strip_prefix(&*difference.element);
+    let of = |value: &str| match (difference.kind, value.parse::<usize>()) {
+        ("restarts", Ok(n)) => words::count(n, "restart").into(),
+        ("messages", Ok(n)) => words::count(n, "message").into(),
+        ("event", _) if value.is_empty() => "no such event".into(),
+        ("begin", _) => format!("begins at {value}").into(),
+        ("event" | "time", _) => format!("{} {value}", event.unwrap_or("").trim()).into(),
+        _ => value.into(),
+    };
+    Detail::Values {
+        from: of(&difference.first),
+        to: of(&difference.second),
     }
 }
 

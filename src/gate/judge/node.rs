@@ -5,7 +5,7 @@ use crate::base::rhythm::CLOSING_NS;
 use crate::base::time::Span;
 use crate::base::words;
 use crate::gate::expectation::{At, Entry, MayEnd, Within, YamlPlace};
-use crate::gate::facts::Role;
+use crate::gate::facts::{ENDS, Role};
 use crate::gate::finding::{Cause, Finding, FindingKind};
 use crate::gate::values::{Pattern, Range};
 use crate::mission::event_log::{Event, Kind};
@@ -164,7 +164,7 @@ impl Judge<'_> {
             .saw(format!("ended at {clock}"), expected)
             .at(Span::new(end, whole.end))
             .details([format!("{rest} before the end of the mission")])
-            .because(self.facts.cause(&nodes, around));
+            .because(self.facts.cause(&nodes, ENDS, around));
         Some(finding)
     }
 
@@ -189,7 +189,14 @@ impl Judge<'_> {
         }
         let text = format!("{name} appeared at {clock}, expected {expected}");
         let finding = Finding::new(kind, name, at, text).saw(format!("at {clock}"), expected);
-        Some(finding.at(Span::new(whole.start, began.time)))
+        let at = Span::new(began.time, began.time.plus(1));
+        let nodes = role.nodes.iter().copied().collect();
+        let cause = self.facts.cause(&nodes, &[Kind::Started], at);
+        Some(
+            finding
+                .at(Span::new(whole.start, began.time))
+                .because(cause),
+        )
     }
 
     fn restarted(&self, role: Role<'_>, _: &Entry, range: &At<Range>) -> Option<Finding> {

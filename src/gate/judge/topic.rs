@@ -6,10 +6,11 @@ use crate::base::rhythm::{CLOSING_NS, DISCOVERY_NS};
 use crate::base::time::Span;
 use crate::base::words;
 use crate::gate::expectation::{At, Entry, Length, MayEnd, Names, Within, YamlPlace};
-use crate::gate::facts::{Peer, Rate, Role, TopicSilence};
+use crate::gate::facts::{ENDS, Peer, Rate, Role, TopicSilence};
 use crate::gate::finding::{Finding, FindingKind};
 use crate::gate::values::{Measure, Pattern, Range};
 use crate::graph::{NodeId, TopicId};
+use crate::mission::event_log::Kind;
 
 /// The names of a list, in short.
 fn listed(names: &Names) -> String {
@@ -307,7 +308,7 @@ impl Judge<'_> {
             .saw(seen, words::rate_range(range.from, range.to))
             .at(span)
             .details([detail])
-            .because(self.facts.cause_for_topic(off.topic, around));
+            .because(self.facts.cause_for_topic(off.topic, ENDS, around));
         Some(finding)
     }
 
@@ -338,7 +339,7 @@ impl Judge<'_> {
         let name = self.facts.topic(topic);
         let hz = words::rate(mean);
         let span = Span::new(first.span.start, last.span.end);
-        let text = format!("{name} at {hz} from first to last message, expected {range}");
+        let text = format!("{name} at {hz} over the recording, expected {range}");
         let finding = Finding::new(kind, name, at, text)
             .saw(&hz, words::rate_range(range.from, range.to))
             .at(span)
@@ -386,7 +387,11 @@ impl Judge<'_> {
             .saw(format!("at {clock}"), expected)
             .at(Span::new(whole.start, active.start))
             .details(Self::senders(entry));
-        Some(finding)
+        // A publisher that started when the topic was due, or a moment before its first message.
+        let due = allowed.end.min(active.start.plus(-CLOSING_NS));
+        let around = Span::new(due, active.start.plus(1));
+        let cause = self.facts.cause_for_topic(topic, &[Kind::Started], around);
+        Some(finding.because(cause))
     }
 
     /// The finding on whether a topic ended in the time in which it may.
@@ -407,7 +412,7 @@ impl Judge<'_> {
             .saw(format!("ended at {clock}"), expected)
             .at(Span::new(end, whole.end))
             .details(Self::senders(entry))
-            .because(self.facts.cause_for_topic(topic, around));
+            .because(self.facts.cause_for_topic(topic, ENDS, around));
         Some(finding)
     }
 
@@ -428,7 +433,7 @@ impl Judge<'_> {
             .saw(seen, format!("at most {expected}"))
             .at(span)
             .details([format!("within {}", self.facts.stretch(span))])
-            .because(self.facts.cause_for_topic(topic, span));
+            .because(self.facts.cause_for_topic(topic, ENDS, span));
         Some(finding)
     }
 
@@ -480,7 +485,7 @@ impl Judge<'_> {
             .saw(seen, expected)
             .at(span)
             .details([detail])
-            .because(self.facts.cause_for_topic(topic, around));
+            .because(self.facts.cause_for_topic(topic, ENDS, around));
         Some(finding)
     }
 }

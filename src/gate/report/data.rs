@@ -7,6 +7,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::Subject;
+use crate::base::error::Error;
 use crate::base::words;
 use crate::draw::paint::xml::Xml;
 use crate::gate::finding::{Finding, FindingKind, Severity};
@@ -208,23 +209,47 @@ pub(super) fn junit(subject: &Subject<'_>, verdict: &Verdict) -> String {
     // A warning passes, as it does for the exit code.
     let is_failed = |check: &&CheckedFact| !of_severity(check, Severity::Error).is_empty();
     let failures = verdict.checks.iter().filter(is_failed).count();
+    let mut xml = suites(
+        &subject.name(),
+        [verdict.checks.len(), failures, 0, skipped],
+    );
+    for check in &verdict.checks {
+        case(&mut xml, subject, check);
+    }
+    xml.finish() + "\n"
+}
+
+/// `JUnit` XML of a recording that could not be checked: one test case with an error. Ends in a new line.
+pub(crate) fn unchecked(name: &str, file: &str, error: &Error) -> String {
+    let mut xml = suites(name, [1, 0, 1, 0]);
+    xml.open("testcase")
+        .attribute("classname", file)
+        .attribute("name", "the recording can be checked")
+        .attribute("time", 0);
+    xml.open("error")
+        .attribute("message", error)
+        .text(&error.hint())
+        .close()
+        .close();
+    xml.finish() + "\n"
+}
+
+/// The beginning of both, with the numbers of tests, failures, errors and skipped tests.
+fn suites(name: &str, [tests, failures, errors, skipped]: [usize; 4]) -> Xml {
     let mut xml = Xml::default();
     xml.raw("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
     for tag in ["testsuites", "testsuite"] {
         xml.open(tag)
-            .attribute("name", subject.name())
-            .attribute("tests", verdict.checks.len())
+            .attribute("name", name)
+            .attribute("tests", tests)
             .attribute("failures", failures)
-            .attribute("errors", 0);
+            .attribute("errors", errors);
         if tag == "testsuite" {
             xml.attribute("skipped", skipped);
         }
         xml.raw("\n");
     }
-    for check in &verdict.checks {
-        case(&mut xml, subject, check);
-    }
-    xml.finish() + "\n"
+    xml
 }
 
 fn of_severity(check: &CheckedFact, severity: Severity) -> Vec<&Finding> {

@@ -42,7 +42,7 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
         out += &folded("Graph around the changes", &chart);
     }
     if broken.iter().any(|f| f.accept.is_some()) {
-        let command = block("sh", &subject.accept(None));
+        let command = block("sh", &subject.accept(&BTreeSet::new()));
         out += &folded("Accept these changes", &command);
     }
     undecidable(&of_severity(&[Severity::Unknown]), &mut out);

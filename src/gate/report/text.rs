@@ -20,8 +20,17 @@ pub(super) fn text(subject: &Subject<'_>, verdict: &Verdict) -> String {
             let many = words::count(group.findings.len(), "finding");
             let _ = writeln!(out, "{cause}: {many}");
         }
+        let known = group
+            .findings
+            .iter()
+            .filter(|f| f.severity != Severity::Unknown);
+        let names: BTreeSet<&str> = known.filter_map(|f| f.accept.as_deref()).collect();
         for one in group.findings {
             finding(subject, one, is_one, &mut hinted, &mut out);
+        }
+        // Once per cause.
+        if !names.is_empty() {
+            let _ = writeln!(out, "   =  accept: {}", subject.accept(&names));
         }
     }
     inert_groups(&(out + &last_line(subject, verdict)))
@@ -64,11 +73,6 @@ fn finding(
     // Hints apply to all findings of a kind.
     for hint in finding.help.iter().filter(|h| hinted.insert((*h).clone())) {
         let _ = writeln!(out, "   =  {hint}");
-    }
-    if let Some(name) = &finding.accept
-        && finding.severity != Severity::Unknown
-    {
-        let _ = writeln!(out, "   =  accept: {}", subject.accept(Some(name)));
     }
 }
 

@@ -15,7 +15,7 @@ use crate::evidence::inference::ElementKey;
 use crate::evidence::observation::Name;
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::restarts::{Restart, Restarts};
-use crate::graph::history::{Bound, Stretch, hide};
+use crate::graph::history::{Bound, Stretch, hide, strays};
 
 /// The signs and lifetimes of every element.
 ///
@@ -339,7 +339,7 @@ pub(crate) struct Pulse {
 }
 
 impl Pulse {
-    /// The rhythm of a sender, if it has one. Its pauses are neither restarts nor the recorder's.
+    /// The rhythm of a sender, if it has one. Its pauses are neither restarts nor the recorder's, nor before it.
     pub(crate) fn of(
         stretches: &[Stretch],
         restarts: &[Restart],
@@ -347,7 +347,8 @@ impl Pulse {
         until: Stamp,
     ) -> Option<Self> {
         let last = stretches.last()?;
-        let pauses = stretches.windows(2).map(|p| (p[0].last, p[1].first));
+        let steady = stretches.get(strays(stretches)..).unwrap_or_default();
+        let pauses = steady.windows(2).map(|p| (p[0].last, p[1].first));
         let pauses = pauses.filter(|(from, to)| {
             let mut away = restarts.iter().map(|r| *from <= r.birth && r.death <= *to);
             !away.any(|is_away| is_away) && !hide(recorder, (*from, Some(*to)))

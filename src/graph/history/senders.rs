@@ -5,7 +5,7 @@ use std::io;
 
 use crate::base::error::Result;
 use crate::base::name::is_feedback;
-use crate::base::rhythm::{EVEN, EVEN_OF_TWO, FEWEST_INTERVALS, GAP, GAP_NS, SAME_RATE};
+use crate::base::rhythm::{EVEN, EVEN_OF_TWO, FEWEST, FEWEST_INTERVALS, GAP, GAP_NS, SAME_RATE};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
@@ -242,7 +242,9 @@ fn gaps(times: &[Stamp]) -> Vec<usize> {
         if long <= GAP_NS || found.len() >= MOST_GAPS {
             continue;
         }
-        let before = usual(&times[at.saturating_sub(AROUND + 1)..at]);
+        // Stray messages before the first rhythm show none.
+        let is_steady = at as u64 >= FEWEST;
+        let before = usual(&times[at.saturating_sub(AROUND + 1)..at]).filter(|_| is_steady);
         let after = usual(&times[at..times.len().min(at + AROUND + 1)]);
         let longest = match (before, after) {
             (Some(a), Some(b)) => Some(a.max(b)),

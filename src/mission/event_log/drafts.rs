@@ -23,8 +23,11 @@ pub(super) struct Drafts {
 }
 
 impl Drafts {
-    /// Adds an event; returns its index.
-    pub(super) fn add(&mut self, event: Event) -> EventId {
+    /// Adds an event; returns its index. It is no part of a quiet one unless it is quiet too.
+    pub(super) fn add(&mut self, mut event: Event) -> EventId {
+        event.part_of = event
+            .part_of
+            .filter(|whole| event.quiet || !self.get(*whole).quiet);
         self.list.push(event)
     }
 
@@ -33,10 +36,11 @@ impl Drafts {
         &self.list[id]
     }
 
-    /// Makes a headline a part of another event, unless that is a part of it.
+    /// Makes a headline a part of another event, unless that is a part of it, or is quiet and would hide it.
     pub(super) fn fold(&mut self, part: EventId, whole: EventId) {
         let whole = self.root(whole);
-        if whole != part {
+        let is_hidden = self.get(whole).quiet && !self.get(part).quiet;
+        if whole != part && !is_hidden {
             self.list[part].part_of = Some(whole);
         }
     }

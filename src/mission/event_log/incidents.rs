@@ -80,18 +80,14 @@ fn publishers(context: &LogInput<'_>, topic: Name) -> Vec<NodeId> {
 /// Makes the silences of a topic and of its nodes parts of the loss that explains them. A loss is reported after it
 /// happened.
 fn explain(drafts: &mut Drafts, loss: EventId, topic: Element, (from, to): (Stamp, Stamp)) {
-    let list = &mut drafts.list;
-    let silences = list.with_ids().filter(|(_, e)| {
+    let silences = drafts.list.with_ids().filter(|(_, e)| {
         let is_then = e.time <= to && e.until.is_none_or(|end| from <= end.plus(CLOSE_NS));
         e.kind == Kind::Silent && e.what == topic && is_then
     });
     let wholes: Vec<EventId> = silences.map(|(id, e)| e.part_of.unwrap_or(id)).collect();
     for whole in wholes {
-        let is_silence = list.get(whole).is_some_and(|e| e.kind == Kind::Silent);
-        for (id, event) in list.ids().zip(list.iter_mut()) {
-            if is_silence && (id == whole || event.part_of == Some(whole)) {
-                event.part_of = Some(loss);
-            }
+        if drafts.get(whole).kind == Kind::Silent {
+            drafts.fold(whole, loss);
         }
     }
 }

@@ -5,9 +5,9 @@
 
 use super::drafts::{Drafts, LogInput};
 use super::{Detail, Kind};
-use crate::base::rhythm::{FEWEST_OF_RATE, RATE_HOLDS_NS, RATE_PAUSE_NS};
+use crate::base::rhythm::{ABOUT_NONE, FEWEST_OF_RATE, RATE_HOLDS_NS, RATE_PAUSE_NS};
 use crate::graph::Element;
-use crate::graph::history::{Bound, Sender, Stretch};
+use crate::graph::history::{Bound, Sender, Stretch, strays};
 
 /// The error of a rate as a fraction of it: a step from 8 to 10 Hz is not more than a quarter.
 const EXACT: f64 = 0.01;
@@ -16,25 +16,29 @@ const EXACT: f64 = 0.01;
 pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     let senders = context.history.sending.senders.iter();
     for sender in senders.filter(|v| !v.is_latched && !context.is_by_the_way(v.topic)) {
-        for pair in sender.stretches.windows(2) {
+        for (pair, end) in sender.stretches.windows(2).zip(1..) {
             let (before, after) = (&pair[0], &pair[1]);
-            if !changes(before, after, context.rate_change)
-                || is_away(context, sender, before, after)
-            {
+            let is_first = end == strays(&sender.stretches);
+            let none = is_first.then(|| about_none(&sender.stretches[..end], after));
+            let is_change = changes(before, after, context.rate_change);
+            let from_hz = none.flatten().or_else(|| is_change.then(|| before.hz()));
+            let Some(from_hz) = from_hz.filter(|_| !is_away(context, sender, before, after)) else {
                 continue;
-            }
+            };
             let factor = after.hz() / before.hz();
             if context.history.simulation.explains(after.first, factor) {
                 continue;
             }
+            // Stray messages are not uncertain: the rate begins with its first message.
+            let last = none.flatten().map_or(before.last, |_| after.first);
             let at = Bound {
                 time: after.first,
-                earliest: before.last.min(after.first.plus(-before.period)),
+                earliest: last.min(after.first.plus(-before.period)),
                 latest: after.first.plus(after.period),
             };
             let mut event = context.event(Kind::Rate, context.publication(sender), at);
             event.detail = Detail::Rates {
-                from_hz: before.hz(),
+                from_hz,
                 to_hz: after.hz(),
             };
             drafts.add(event);
@@ -42,11 +46,22 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     }
 }
 
+/// The rate of stray messages from which a steady rate begins, such as 0.01 Hz of one message 90 s before; `None` if it does not.
+fn about_none(strays: &[Stretch], after: &Stretch) -> Option<f64> {
+    let count: u64 = strays.iter().map(|s| s.count).sum();
+    let (first, last) = (strays.first()?.first, strays.last()?.last);
+    let hz = count as f64 * 1e9 / after.first.since(first).max(1) as f64;
+    let begins = holds(after) && hz * ABOUT_NONE < after.hz();
+    (begins && after.first.since(last) > RATE_PAUSE_NS).then_some(hz)
+}
+
+/// Whether a rate is steady for long enough.
+fn holds(s: &Stretch) -> bool {
+    s.is_even && s.count >= FEWEST_OF_RATE && s.last.since(s.first) >= RATE_HOLDS_NS
+}
+
 /// Whether a steady rate changes to another one.
 fn changes(before: &Stretch, after: &Stretch, share: f64) -> bool {
-    let holds = |s: &Stretch| {
-        s.is_even && s.count >= FEWEST_OF_RATE && s.last.since(s.first) >= RATE_HOLDS_NS
-    };
     let step = (after.hz() - before.hz()).abs() / before.hz().min(after.hz());
     let differs = step > share + EXACT;
     let meets = after.is_joined || after.first.since(before.last) <= RATE_PAUSE_NS;

@@ -180,6 +180,10 @@ fn add_edge(
         event.part_of = near;
         let id = drafts.add(event);
         let whole = near.unwrap_or(id);
-        wholes.topics.entry((topic, kind, at.time)).or_insert(whole);
+        let of_topic = wholes.topics.entry((topic, kind, at.time)).or_insert(whole);
+        // One that is shown.
+        if drafts.get(*of_topic).quiet {
+            *of_topic = whole;
+        }
     }
 }

@@ -61,6 +61,11 @@ const COLUMNS: &[ColumnOf<(), SurveyRow>] = columns! {
     "subscribes_stated" I64 |(), row| known(row, |info| TableCell::count(info.subscribes_by_degree.stated));
     "named_nodes" I64 |(), row| known(row, |info| TableCell::count(info.nodes.iter().filter(|node| is_named(node)).count()));
     "unknown_publishers" I64 |(), row| known(row, unknown_publishers);
+    "changes" I64 |(), row| known(row, |info| TableCell::count(info.changes.all));
+    "starts" I64 |(), row| known(row, |info| TableCell::count(info.changes.starts));
+    "stops" I64 |(), row| known(row, |info| TableCell::count(info.changes.stops));
+    "restarts" I64 |(), row| known(row, |info| TableCell::count(info.changes.restarts));
+    "rates" I64 |(), row| known(row, |info| TableCell::count(info.changes.rates));
     "evidence" Text |(), row| known(row, |info| TableCell::text(evidence(info)));
     "error" Text |(), row| TableCell::known(row.error.as_deref(), TableCell::text);
 };
@@ -118,6 +123,10 @@ pub fn survey_text(rows: &[SurveyRow], width: Option<usize>) -> String {
         column("nodes", true, WHOLE, 0),
         column("pub", true, WHOLE, 2),
         column("sub", true, WHOLE, 3),
+        column("starts", true, WHOLE, 2),
+        column("stops", true, WHOLE, 2),
+        column("restarts", true, WHOLE, 6),
+        column("rates", true, WHOLE, 2),
         column("evidence", false, 12, 1),
     ];
     let read: Vec<Vec<Cell>> = rows.iter().filter_map(|row| text_row(row, width)).collect();
@@ -158,6 +167,10 @@ fn text_row(row: &SurveyRow, width: Option<usize>) -> Option<Vec<Cell>> {
         info.nodes_by_degree.total().to_string(),
         info.publishes_by_degree.total().to_string(),
         info.subscribes_by_degree.total().to_string(),
+        info.changes.starts.to_string(),
+        info.changes.stops.to_string(),
+        info.changes.restarts.to_string(),
+        info.changes.rates.to_string(),
         evidence(info),
     ];
     Some(cells.into_iter().map(Cell::Text).collect())

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{ConfidenceCounts, Info, NodeInfo, TopicInfo};
+use crate::bag::Tier;
 use crate::base::columns::{Cell, Column, WHOLE, hang, table};
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
@@ -52,15 +53,22 @@ fn head(out: &mut String, info: &Info) -> std::fmt::Result {
             .as_ref()
             .map_or_else(String::new, |why| format!(" ({})", visible(why)));
         let state = if bag.complete { "" } else { ", damaged" };
-        let compression = bag.compression.join("+");
-        let compression = visible(&compression);
+        let compression = bag.compression.iter().filter(|word| *word != "none");
+        let compression: Vec<&str> = compression.map(String::as_str).collect();
+        let compression = compression.join("+");
+        let compression = format!(" {}", visible(&compression));
+        let compression = compression.trim_end();
         writeln!(
             out,
-            "{}  {} {compression}, {}, read by {}{how}{state}",
+            "{}  {}{compression}, {}, read {}{how}{state}",
             visible(&bag.name),
             bag.format,
             words::bytes(bag.file_bytes),
-            bag.tier.word()
+            match bag.tier {
+                Tier::Index => "by its index",
+                Tier::Forward => "from the front",
+                Tier::Verify => "by the second reader",
+            }
         )?;
         for (key, value) in &bag.facts {
             writeln!(out, "  {}: {}", visible(key), visible(value))?;
@@ -70,9 +78,12 @@ fn head(out: &mut String, info: &Info) -> std::fmt::Result {
     writeln!(out, "from  {start}\nto    {end}")?;
     writeln!(
         out,
-        "{} of mission, {} messages\n",
+        "{} long, {}\n",
         words::offset((info.end_ns - 1).saturating_sub(info.start_ns) / 1_000_000 * 1_000_000),
-        info.messages
+        words::count(
+            usize::try_from(info.messages).unwrap_or(usize::MAX),
+            "message"
+        )
     )
 }
 
@@ -92,11 +103,12 @@ fn known(out: &mut String, info: &Info) -> std::fmt::Result {
         .sum();
     let counted = match unknown as usize {
         0 => String::new(),
-        n => format!(" ({} are unnamed)", words::count(n, "publisher")),
+        n => format!(" ({})", words::count(n, "unnamed publisher")),
     };
     writeln!(
         out,
-        "of {with} topics with messages, {} have a known publisher{counted}, {} a known subscriber",
+        "of {} with messages, {} with a known publisher{counted}, {} with a known subscriber",
+        words::count(with, "topic"),
         with - info.topics_without_publisher,
         with - info.topics_without_subscriber
     )?;
@@ -152,7 +164,7 @@ const TOPIC_COLUMNS: [Column; 6] = [
     column("topic", false, 28, (0, 0)),
     column("type", false, 12, (2, 1)),
     column("messages", true, WHOLE, (0, 0)),
-    column("rate", true, WHOLE, (0, 0)),
+    column("while sending", true, WHOLE, (0, 0)),
     column("skew", true, WHOLE, (0, 3)),
     column("activity", false, 8, (1, 2)),
 ];

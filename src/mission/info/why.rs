@@ -1,18 +1,20 @@
-//! The explanation of an element: its evidence, its lifetime, and each piece of evidence with its time and text.
+//! The explanation of an element: who sends and receives it, and when; then its evidence, each piece with its time and text.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use crate::base::error::{Error, Result};
+use crate::base::name::is_quiet;
 use crate::base::nearest::nearest;
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
 use crate::evidence::EvidenceLine;
 use crate::graph::{Edge, Element};
 use crate::mission::Mission;
+use crate::mission::event_log::Kind;
 
-/// The elements with all of `names` (one: a node or topic of that name; two: the edges between them), each
-/// with its evidence and lifetime, then the `pieces` in order of time. Plain text, a line each; repeated
+/// The elements with all of `names` (one: a node or topic of that name; two: the edges between them), each with the answer
+/// and its kinds of evidence, then the `pieces` in order of time, the recorder's last. Plain text, a line each; repeated
 /// pieces are written once, with their number. Names are as recorded.
 ///
 /// # Errors
@@ -25,10 +27,15 @@ pub fn why(mission: &Mission, names: &[String], pieces: &[EvidenceLine]) -> Resu
     let mut out = String::new();
     for (element, title) in found {
         // Writing to a string cannot fail.
-        let _ = describe(&mut out, mission, element, &title);
+        let _ = describe(&mut out, mission, (element, &title), pieces);
     }
     let at = |time| words::offset(mission.offset(time));
-    for said in said(pieces) {
+    let tools = mission.elements.nodes.iter().filter(|node| node.is_tool());
+    let tools: Vec<&str> = tools.map(|node| node.name.as_str()).collect();
+    let is_tool = |text: &str| tools.iter().any(|name| text.starts_with(*name));
+    let mut all = said(pieces);
+    all.sort_by_key(|said| is_tool(&said.piece.text));
+    for said in all {
         let piece = said.piece;
         let first = piece.time.map_or_else(|| "always".to_owned(), at);
         let again = match said.last {
@@ -111,34 +118,141 @@ fn elements(mission: &Mission, names: &[String]) -> Vec<(Element, String)> {
 fn describe(
     out: &mut String,
     mission: &Mission,
-    element: Element,
-    title: &str,
+    (element, title): (Element, &str),
+    pieces: &[EvidenceLine],
 ) -> std::fmt::Result {
-    let all = &mission.elements;
-    let seen = all.seen(element);
-    let at = |time: Option<Stamp>| {
-        time.map_or_else(
-            || "?".to_owned(),
-            |time| words::offset(mission.offset(time)),
-        )
-    };
+    let seen = mission.elements.seen(element);
+    let at = |time: Stamp| words::offset(mission.offset(time));
     let words: Vec<&str> = seen.evidence.words().collect();
-    let signs = match (seen.first, seen.last) {
-        (None, None) => "no times of its own".to_owned(),
-        (first, last) => format!("first sign {}, last sign {}", at(first), at(last)),
+    let signs = match seen.first.zip(seen.last) {
+        None => "no times of its own".to_owned(),
+        Some((first, last)) => format!("first sign {}, last sign {}", at(first), at(last)),
     };
-    writeln!(
-        out,
-        "{}\n  evidence: {}; {signs}",
-        visible(title),
-        words.join(", ")
-    )?;
-    let windows = mission.graphs.rows(element).count();
-    writeln!(
-        out,
-        "  present in {windows} of {} parts of the mission",
-        mission.windows.len()
-    )
+    writeln!(out, "{}", visible(title))?;
+    for line in answer(mission, element, pieces) {
+        writeln!(out, "  {}", visible(&line))?;
+    }
+    writeln!(out, "  evidence: {}; {signs}", words.join(", "))
+}
+
+/// The most names in a line of the answer, the most times of each, and the most log records before an end.
+const NAMES: usize = 12;
+const TIMES: usize = 3;
+const LOGS: usize = 3;
+/// The time before an end of a node, and after it, in which its warnings may tell why it ended.
+const LOGGED_NS: (i64, i64) = (60_000_000_000, 5_000_000_000);
+
+/// Who publishes and receives a topic, and when; when a node ran, its topics, and its last warnings before each of its ends.
+fn answer(mission: &Mission, element: Element, pieces: &[EvidenceLine]) -> Vec<String> {
+    let all = &mission.elements;
+    let peers = |publishes: bool, of: &dyn Fn(&Edge) -> bool, name: &dyn Fn(&Edge) -> String| {
+        let edges = all.edges().filter(|(what, edge)| {
+            let is_shown = !edge.seen.evidence.is_guess() && !all.nodes[edge.node].is_tool();
+            of(edge) && is_shown && matches!(what, Element::Publish(_)) == publishes
+        });
+        let named = edges.map(|(what, edge)| {
+            let lives = &all.seen(what).lives;
+            let text = format!("{} {}", name(edge), when(mission, what));
+            (
+                lives.first().map(|life| life.start),
+                text.trim_end().to_owned(),
+            )
+        });
+        let mut named: Vec<_> = named.collect();
+        named.sort();
+        let named: Vec<String> = named.into_iter().map(|(_, text)| text).collect();
+        (!named.is_empty()).then(|| words::some_of(&named, NAMES))
+    };
+    match element {
+        Element::Topic(id) => {
+            let node = |edge: &Edge| all.nodes[edge.node].name.to_string();
+            let of = |edge: &Edge| edge.topic == id;
+            let unnamed = all.topics[id].unknown_publishers.filter(|n| *n > 0);
+            let unnamed = unnamed.map(|n| words::count(n as usize, "unnamed node"));
+            let senders = [peers(true, &of, &node), unnamed].into_iter().flatten();
+            let senders: Vec<String> = senders.collect();
+            let receivers = peers(false, &of, &node);
+            let or = |known: String| {
+                if known.is_empty() {
+                    "no known node".to_owned()
+                } else {
+                    known
+                }
+            };
+            vec![
+                format!("published by {}", or(senders.join(", and by "))),
+                format!("received by {}", or(receivers.unwrap_or_default())),
+            ]
+        }
+        Element::Node(id) => {
+            let topic = |edge: &Edge| all.topics[edge.topic].name.to_string();
+            let of =
+                |edge: &Edge| edge.node == id && !is_quiet(all.topics[edge.topic].name.as_str());
+            let listed =
+                [("publishes", true), ("subscribes to", false)].map(|(verb, publishes)| {
+                    peers(publishes, &of, &topic).map(|topics| format!("{verb} {topics}"))
+                });
+            let mut lines = vec![format!("ran {}", when(mission, element))];
+            lines.extend(listed.into_iter().flatten());
+            let own = mission.log.events.iter().filter(|e| e.what == element);
+            let ends = own.filter(|e| matches!(e.kind, Kind::Stopped | Kind::Restarted));
+            for end in ends {
+                let at = words::offset_tenths(mission.offset(end.time));
+                lines.push(format!("{} at {at}", end.kind.word()));
+                lines.extend(logged(
+                    mission,
+                    all.nodes[id].name.as_str(),
+                    end.time,
+                    pieces,
+                ));
+            }
+            lines
+        }
+        edge => vec![when(mission, edge)],
+    }
+}
+
+/// When an element existed: `00:38–02:56`, `04:59–` to the end, `throughout`.
+fn when(mission: &Mission, what: Element) -> String {
+    let at = |time: Stamp, is_open: bool| {
+        if is_open {
+            String::new()
+        } else {
+            words::offset_seconds(mission.offset(time))
+        }
+    };
+    let whole = mission.span;
+    let lives = mission.elements.seen(what).lives.iter().map(|life| {
+        let from = at(life.start, life.start <= whole.start);
+        let to = at(life.end, life.end >= whole.end);
+        if from.is_empty() && to.is_empty() {
+            "throughout".to_owned()
+        } else {
+            format!("{from}–{to}")
+        }
+    });
+    words::some_of(&lives.collect::<Vec<String>>(), TIMES)
+}
+
+/// The last warnings and errors that a node logged before an end.
+fn logged(mission: &Mission, name: &str, end: Stamp, pieces: &[EvidenceLine]) -> Vec<String> {
+    let own = pieces.iter().filter_map(|piece| {
+        let (logger, text) = piece.text.split_once(" logs ")?;
+        let is_own = logger
+            .strip_prefix(name)
+            .is_some_and(|part| part.is_empty() || part.starts_with('/'));
+        let time = piece
+            .time
+            .filter(|time| (-LOGGED_NS.0..=LOGGED_NS.1).contains(&time.since(end)))?;
+        let is_warning = ["WARN:", "ERROR:", "FATAL:"]
+            .iter()
+            .any(|word| text.starts_with(word));
+        let at = words::offset_tenths(mission.offset(time));
+        (is_own && is_warning).then(|| format!("  {at} {text}"))
+    });
+    let mut own: Vec<String> = own.collect();
+    own.dedup();
+    own.split_off(own.len().saturating_sub(LOGS))
 }
 
 /// The largest number of similar names that are offered: a hint is one line.

@@ -64,8 +64,21 @@ enum Key {
     },
 }
 
+/// A row with its place among all that were printed as `id`: that in the log of a growing recording changes.
+fn numbered(mut line: LogLine, id: usize) -> LogLine {
+    if let Some((_, rest)) = line
+        .words
+        .strip_prefix("{\"id\":")
+        .and_then(|row| row.split_once(','))
+    {
+        line.words = format!("{{\"id\":{id},{rest}");
+    }
+    line
+}
+
 /// A printed event.
 struct Printed {
+    id: usize,
     key: Key,
     time: Stamp,
     certainty: Certainty,
@@ -78,6 +91,8 @@ struct Printed {
 #[derive(Default)]
 pub struct Feed {
     printed: Vec<Printed>,
+    /// The number of all that were ever printed.
+    many: usize,
 }
 
 /// The time after which an end is certain: as long as the mission's closing part, in which ends are not findings. An
@@ -115,7 +130,9 @@ impl Feed {
         for (place, key, time, certainty, row) in found {
             let is_new = place.is_none_or(|at| self.printed[at].certainty < certainty);
             let place = place.unwrap_or_else(|| {
+                self.many += 1;
                 self.printed.push(Printed {
+                    id: self.many - 1,
                     key,
                     time,
                     certainty,
@@ -135,6 +152,7 @@ impl Feed {
         let mut lines = Vec::new();
         for (place, line) in places.into_iter().zip(row_lines(mission, &rows, format)) {
             let printed = &mut self.printed[place];
+            let line = numbered(line, printed.id);
             lines.push(printed.certainty.mark(line.clone(), format));
             printed.line = line;
         }

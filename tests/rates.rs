@@ -1,0 +1,179 @@
+//! Tests of rates: those that begin from about none, and the two numbers of a topic, which are the same in every output.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+use crate::causes::shown;
+use crate::support::cdr::Cdr;
+use crate::support::{Recording, mcap};
+
+/// Two minutes and ten seconds in which a topic is sent in these seconds at 25 Hz, and once at each of `strays`.
+fn bursts(strays: &[i64], bursts: &[(i64, i64)]) -> Recording {
+    let mut bag = Recording::default();
+    let odom = bag.publisher("/base", "/odom", "std_msgs/Empty");
+    bag.send(odom, (0, 130_000), 100, &[]);
+    let speed = bag.publisher("/pilot", "/cmd_vel", "std_msgs/Empty");
+    for (from, to) in bursts {
+        bag.send(speed, (from * 1_000, to * 1_000), 40, &[]);
+    }
+    for at in strays {
+        bag.send(speed, (*at, at + 1), 1, &[]);
+    }
+    bag
+}
+
+/// The log of a bag whose publishers are unknown.
+fn unnamed(bag: &Recording) -> String {
+    let dir = tempfile::tempdir().unwrap();
+    let options = mcap::Options::default();
+    let mut bag = bag.clone();
+    bag.publishers.iter_mut().for_each(|own| own.node.clear());
+    fs::write(dir.path().join("r.mcap"), mcap::write(&bag, &options)).unwrap();
+    said(dir.path(), "events r.mcap")
+}
+
+fn said(folder: &Path, command: &str) -> String {
+    let mut run = Command::new(env!("CARGO_BIN_EXE_bagreel"));
+    let done = run
+        .current_dir(folder)
+        .args(command.split(' '))
+        .output()
+        .unwrap();
+    String::from_utf8(done.stdout).unwrap()
+}
+
+#[test]
+fn a_stray_message_hides_neither_the_start_of_a_rate_nor_its_end() {
+    for strays in [&[1_800][..], &[1_800, 1_850], &[200, 20_000, 40_000]] {
+        let text = unnamed(&bursts(strays, &[(93, 124)]));
+        assert!(text.contains("01:33.0  /cmd_vel 0.0"), "{text}");
+        assert!(text.contains("→ 25 Hz"), "{text}");
+        assert!(text.contains("02:03.9  /cmd_vel"), "{text}");
+        let text = shown(&bursts(strays, &[(93, 124)]));
+        assert!(
+            text.contains("→ 25 Hz") && text.contains("stopped"),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn the_end_of_a_second_burst_is_an_event() {
+    let text = unnamed(&bursts(&[], &[(10, 30), (93, 120)]));
+    assert!(
+        text.contains("00:30.0  /cmd_vel silent") || text.contains("00:29.9  /cmd_vel silent"),
+        "{text}"
+    );
+    assert!(
+        text.contains("01:59.9  /cmd_vel silent to the end"),
+        "{text}"
+    );
+}
+
+#[test]
+fn the_recorder_hides_no_topic() {
+    let mut bag = Recording::default();
+    let log = bag.publisher("", "/rosout", "rcl_interfaces/msg/Log");
+    let odom = bag.publisher("", "/odom", "std_msgs/msg/Empty");
+    bag.send(odom, (0, 60_000), 100, &[]);
+    let servo = bag.publisher("", "/servo/in/state", "std_msgs/msg/Empty");
+    bag.send(servo, (20_000, 60_000), 100, &[]);
+    for (at, topic) in [(0, "/odom"), (20_000, "/servo/in/state")] {
+        let head = Cdr::default().time(1).u8(20).text("rosbag2_recorder");
+        let record = head.text(&format!("Subscribed to topic '{topic}'"));
+        let file = "./src/rosbag2_transport/recorder.cpp";
+        let record = record.text(file).text("f").u32(7).done();
+        bag.send(log, (at, at + 1), 1, &record);
+    }
+    let text = unnamed(&bag);
+    assert!(text.contains("/servo/in/state appeared"), "{text}");
+}
+
+/// Both numbers of a topic as JSON of `info`.
+fn numbers(folder: &Path, bag: &str) -> Vec<(String, Option<f64>, Option<f64>)> {
+    let info: Value =
+        serde_json::from_str(&said(folder, &format!("info {bag} --format json"))).unwrap();
+    let topics = info["topics"].as_array().unwrap().iter();
+    let topics = topics.map(|one| {
+        let name = one["name"].as_str().unwrap().to_owned();
+        (name, one["hz"].as_f64(), one["mean_hz"].as_f64())
+    });
+    topics.collect()
+}
+
+#[test]
+fn a_topic_has_one_rate_while_sending_in_every_output() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
+    fs::copy(example, here.join("w.bag")).unwrap();
+    let numbers = numbers(here, "w.bag");
+    said(here, "render w.bag --period all -o w.md -o w.svg");
+    said(
+        here,
+        "figure w.bag --rows topics --phases none --width 181mm -o lives.svg",
+    );
+    let read = |name: &str| fs::read_to_string(here.join(name)).unwrap();
+    let (report, picture, figure) = (read("w.md"), read("w.svg"), read("lives.svg"));
+    let text = said(here, "info w.bag");
+    assert!(text.contains("while sending") && report.contains("Hz while sending"));
+    assert!(picture.contains("rates while sending") && figure.contains("while sending"));
+    let mut compared = 0;
+    for (name, hz, mean_hz) in &numbers {
+        let Some(hz) = hz else { continue };
+        assert!(
+            mean_hz.is_none_or(|mean| mean <= hz * 1.1 + 0.01),
+            "{name}: {hz}, {mean_hz:?}"
+        );
+        let number = bagreel::internals::base::words::number(*hz);
+        let row = report
+            .lines()
+            .find(|line| line.starts_with(&format!("| `{name}` | `")));
+        if let Some(row) = row {
+            assert!(row.contains(&format!("| {number} |")), "{number}: {row}");
+            compared += 1;
+        }
+        let row = text
+            .lines()
+            .find(|line| line.split_whitespace().next() == Some(name))
+            .unwrap();
+        assert!(
+            row.contains(&bagreel::internals::base::words::rate(*hz)),
+            "{hz}: {row}"
+        );
+    }
+    assert!(compared > 30, "{compared}");
+}
+
+#[test]
+fn a_difference_of_rates_is_one_pair_of_numbers_with_its_word() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let write = |name: &str, bag: &Recording| {
+        let bytes =
+            crate::support::rosbag1::write(bag, crate::support::rosbag1::Pack::None, 20_000);
+        fs::write(here.join(name), bytes).unwrap();
+    };
+    let steady = |period: i64| {
+        let mut bag = Recording::default();
+        let scan = bag.publisher("/lidar", "/scan", "std_msgs/Empty");
+        bag.send(scan, (0, 120_000), period, &[]);
+        bag
+    };
+    write("a.bag", &steady(100));
+    write("b.bag", &steady(200));
+    let text = said(here, "diff a.bag b.bag -o d.html -o d.md");
+    assert!(text.contains("10 Hz → 5 Hz while sending"), "{text}");
+    let page = fs::read_to_string(here.join("d.html")).unwrap();
+    assert!(page.contains("10 → 5 Hz"));
+    // The same rate for half of the time.
+    let halves: Vec<(i64, i64)> = (0..12).map(|n| (10 * n, 10 * n + 5)).collect();
+    let whole: Vec<(i64, i64)> = (0..12).map(|n| (10 * n, 10 * n + 10)).collect();
+    write("a.bag", &bursts(&[], &whole));
+    write("b.bag", &bursts(&[], &halves));
+    let text = said(here, "diff a.bag b.bag");
+    assert!(text.contains("over the recording"), "{text}");
+}
