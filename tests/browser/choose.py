@@ -240,6 +240,7 @@ def printed(b, *urls):
         assert all(name and top == beside and high == 14 and split == "avoid" for name, top, beside, high, split in lines), lines
         b.js("dispatchEvent(new Event('afterprint'))")
         b.cdp("Emulation.setEmulatedMedia", media="")
+        time.sleep(0.3)
         assert before == b.js("return [document.querySelector('.graph').getAttribute('viewBox'), document.getElementById('plot').getAttribute('height')]"), "the screen is as before"
     print("  printed pages are landscape and show all names and lifelines, a row each")
 
