@@ -13,8 +13,6 @@ pub(crate) struct LogRecord<'a> {
     pub(crate) text: &'a str,
     /// The path of the source file as recorded by the compiler or interpreter.
     pub(crate) file: &'a str,
-    /// The number of the record among those of its node; `None` in ROS 2.
-    pub(crate) number: Option<u32>,
     /// The topics of the node, as far as roscpp and rospy list them; none in ROS 2.
     pub(crate) topics: Vec<&'a str>,
 }
@@ -30,12 +28,11 @@ impl<'a> LogRecord<'a> {
     /// # Errors
     /// If it has another layout.
     pub(crate) fn read(payload: &mut PayloadCursor<'a>, is_ros1: bool) -> PayloadResult<Self> {
-        let number = if is_ros1 {
-            payload.header()?.number
+        if is_ros1 {
+            payload.header()?;
         } else {
             payload.time()?;
-            None
-        };
+        }
         payload.u8()?;
         let name = payload.string()?;
         let logger = if is_ros1 || name.is_empty() {
@@ -55,7 +52,6 @@ impl<'a> LogRecord<'a> {
             logger,
             text,
             file,
-            number,
             topics,
         })
     }
