@@ -506,6 +506,14 @@ impl Conclusions<'_> {
     /// and subscriptions.
     pub(crate) fn take_at_their_word(&mut self) {
         let endings = self.endings();
+        let facts = self.facts.list.iter();
+        let records = facts.filter_map(|fact| match fact.observation {
+            Observation::Node(node) => {
+                Some(((fact.source, node), self.facts.times.count(fact.times)))
+            }
+            _ => None,
+        });
+        let records: BTreeMap<(SourceId, Name), u64> = records.collect();
         for fact in self.facts.list.clone() {
             let what = match fact.observation {
                 Observation::Node(node) | Observation::Begins(node) => ElementKey::Node(node),
@@ -523,6 +531,14 @@ impl Conclusions<'_> {
                 signs.retain(|sign| !is_refused(*sign, refused));
             }
             if signs.is_empty() && matches!(fact.observation, Observation::Joins(..)) {
+                continue;
+            }
+            // If every log record has the first number, sequence numbers are unused.
+            if let Observation::Begins(node) = fact.observation
+                && source_word(fact.source) == "rosout"
+                && signs.len() > 1
+                && records.get(&(fact.source, node)) == Some(&(signs.len() as u64))
+            {
                 continue;
             }
             let when = match fact.observation {

@@ -136,6 +136,22 @@ fn a_node_starts_only_where_something_shows_that_it_was_absent() {
 }
 
 #[test]
+fn the_first_record_of_a_process_shows_that_it_starts() {
+    let all: Vec<i64> = (0..99).collect();
+    let talks: &[Talk<'_>] = &[("/base", Some("/host"), false, &all)];
+    let logs = |many| -> Vec<Log<'static>> {
+        (0..many)
+            .map(|n| (40 + n, "/late", "hello", &[][..]))
+            .collect()
+    };
+    let built = logged(talks, &logs(1), "late.py");
+    assert_eq!(there(&built, "/late")[0], 4);
+    // Where all records have the same number, it shows nothing.
+    let built = logged(talks, &logs(5), "late.py");
+    assert_eq!(there(&built, "/late")[0], 0);
+}
+
+#[test]
 fn one_stream_that_ends_just_before_the_end_does_not_end_its_node() {
     let until = |end: i64| (0..end).map(|n| n / 2).collect::<Vec<i64>>();
     let (all, short) = (until(200), until(192));

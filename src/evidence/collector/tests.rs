@@ -213,7 +213,9 @@ fn headers_in_converted_recordings_may_have_a_number() {
     };
     let plain = of(stamp.to_owned(), Payload::cdr());
     assert!(plain.contains(&"Lists /a /scan".to_owned()), "{plain:?}");
-    let numbered = of(format!("uint32 seq\n{stamp}"), Payload::cdr().u32(1));
+    let mut numbered = of(format!("uint32 seq\n{stamp}"), Payload::cdr().u32(1));
+    // The number is the first record's.
+    numbered.retain(|line| line != "Begins /a");
     assert_eq!(numbered, plain);
 }
 
@@ -225,6 +227,7 @@ fn a_player_shows_nothing_about_the_nodes_in_its_log() {
     assert_eq!(
         by("/play_1795170682045"),
         [
+            "Begins /b",
             "LogsFrom /b a.py",
             "Node /b",
             "Publish /b /rosout",

@@ -48,6 +48,14 @@ pub(crate) struct PayloadCursor<'a> {
     is_numbered: bool,
 }
 
+/// The content of a `std_msgs/Header`.
+#[derive(Clone, Copy)]
+pub(crate) struct Header {
+    /// The sequence number, which ROS 2 has left out.
+    pub(crate) number: Option<u32>,
+    pub(crate) stamp: Stamp,
+}
+
 impl<'a> PayloadCursor<'a> {
     /// A cursor at the start of a payload.
     ///
@@ -256,17 +264,18 @@ impl<'a> PayloadCursor<'a> {
         Ok(count)
     }
 
-    /// The stamp of the next header.
-    pub(crate) fn header(&mut self) -> PayloadResult<Stamp> {
-        let stamp = self.header_start()?;
+    /// The next header.
+    pub(crate) fn header(&mut self) -> PayloadResult<Header> {
+        let header = self.header_start()?;
         self.skip_string()?;
-        Ok(stamp)
+        Ok(header)
     }
 
-    /// As [`PayloadCursor::header`], up to the stamp.
-    pub(crate) fn header_start(&mut self) -> PayloadResult<Stamp> {
-        self.is_numbered.then(|| self.u32()).transpose()?;
-        self.time()
+    /// The next header up to its stamp.
+    pub(crate) fn header_start(&mut self) -> PayloadResult<Header> {
+        let number = self.is_numbered.then(|| self.u32()).transpose()?;
+        let stamp = self.time()?;
+        Ok(Header { number, stamp })
     }
 }
 

@@ -13,6 +13,8 @@ pub(crate) struct LogRecord<'a> {
     pub(crate) text: &'a str,
     /// The path of the source file as recorded by the compiler or interpreter.
     pub(crate) file: &'a str,
+    /// The number of the record among those of its node; `None` in ROS 2.
+    pub(crate) number: Option<u32>,
     /// The topics of the node, as far as roscpp and rospy list them; none in ROS 2.
     pub(crate) topics: Vec<&'a str>,
 }
@@ -28,11 +30,12 @@ impl<'a> LogRecord<'a> {
     /// # Errors
     /// If it has another layout.
     pub(crate) fn read(payload: &mut PayloadCursor<'a>, is_ros1: bool) -> PayloadResult<Self> {
-        if is_ros1 {
-            payload.header()?;
+        let number = if is_ros1 {
+            payload.header()?.number
         } else {
             payload.time()?;
-        }
+            None
+        };
         payload.u8()?;
         let name = payload.string()?;
         let logger = if is_ros1 || name.is_empty() {
@@ -52,6 +55,7 @@ impl<'a> LogRecord<'a> {
             logger,
             text,
             file,
+            number,
             topics,
         })
     }

@@ -27,7 +27,7 @@ pub(crate) fn read(
     context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
-    let now = payload.header()?;
+    let now = payload.header()?.stamp;
     let mut ids = Vec::new();
     for _ in 0..payload.length(17)? {
         let sent = payload.time()?;

@@ -89,7 +89,7 @@ fn stamp(encoding: &Encoding, header: FirstHeader, first_bytes: &[u8]) -> Option
         if header.is_listed && payload.u32()? == 0 {
             return Ok(Stamp(0));
         }
-        payload.header_start()
+        Ok(payload.header_start()?.stamp)
     });
     stamp.ok().filter(|stamp| *stamp != Stamp(0))
 }

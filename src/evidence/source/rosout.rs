@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use crate::base::name::{LOGS, in_space, is_log, is_player};
+use crate::base::rhythm::FIRST_RECORD;
 use crate::base::role::role;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
 use crate::evidence::message::log::LogRecord;
@@ -23,6 +24,10 @@ pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
     context.states(Observation::Node(node), logs);
     let log = context.stream.topic;
     if is_log(context.stream.connection.topic.as_str()) {
+        if record.number.is_some_and(|number| number <= FIRST_RECORD) {
+            let begins = || format!("{name} logs its first record: {text}");
+            context.states(Observation::Begins(node), begins);
+        }
         context.states(Observation::Publish(node, log), logs);
         let is_host = |host: &Name| *host != node && !is_player(&context.facts.text(*host));
         if let Some(host) = context.stream.publisher.filter(is_host) {

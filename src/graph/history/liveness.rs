@@ -29,6 +29,11 @@ pub(crate) fn collect(
     let mut liveness_of = LivenessOf::new();
     let mut likes = Likes::new();
     let sent = sent(&findings.inferences);
+    // Records of `/rosout` name their nodes themselves.
+    let mut streams = findings.streams.iter();
+    let is_rewritten = streams.any(|stream| {
+        stream.trust == Reliability::First && !is_log(stream.connection.topic.as_str())
+    });
     let mut forwarded = forwarded(findings, traffic);
     forwarded.extend(stand_ins(traffic).map(|what| (what, (true, true))));
     let asked = asked(findings, traffic);
@@ -95,7 +100,10 @@ pub(crate) fn collect(
             Validity::Begins { signs, ends } => {
                 let ends = together(ends, &deaths);
                 liveness.bound_all(signs, &ends);
-                liveness.begins.extend(signs);
+                // Earlier messages of the node may have another's name.
+                if !is_rewritten || !is_from(&inference, "rosout") {
+                    liveness.begins.extend(signs);
+                }
                 if is_from(&inference, "links") {
                     liveness.found.extend(signs);
                 }
