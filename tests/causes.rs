@@ -186,9 +186,17 @@ fn rare_messages_do_not_make_a_topic_appear() {
     }
     bag.messages.sort_by_key(|m| m.1);
     let mission = mission(&bag);
-    let text = log(&mission, LogFormat::Text, LogOptions::default());
-    assert!(text.contains("/goal first message"), "{text}");
-    assert!(!text.contains("/teleop"), "{text}");
+    let text = |all| {
+        let options = LogOptions {
+            all,
+            ..LogOptions::default()
+        };
+        log(&mission, LogFormat::Text, options)
+    };
+    assert_eq!(text(false), "");
+    let all = text(true);
+    assert!(all.contains("/goal first message"), "{all}");
+    assert!(!all.contains("/teleop"), "{all}");
     // The summary shows the same lifetime of the node.
     let info = info(&mission);
     let teleop = info.nodes.iter().find(|node| node.name == "/teleop");

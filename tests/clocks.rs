@@ -442,9 +442,8 @@ fn simulation(simulated: impl Fn(i64) -> Option<i64>) -> Recording {
     let robot = ["/base", "/lidar", "/nav"];
     let robot = robot.map(|node| bag.publisher(node, &format!("{node}/data"), "test/Stamped"));
     for place in [&robot[..], &[joystick]].concat() {
-        bag.publishers[place].definition =
-            "Header header\n====\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
-                .to_owned();
+        "Header header\n====\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
+            .clone_into(&mut bag.publishers[place].definition);
     }
     let time = |millis: i64| [millis / 1000, millis % 1000 * 1_000_000];
     let bytes = |numbers: &[i64]| -> Vec<u8> {
@@ -473,7 +472,7 @@ fn what_simulated_time_does_is_in_the_log_and_explains_silences() {
     assert_eq!(found(&|at| Some(5_000 + at)), ":\n");
     let paused = found(&|at| match at {
         ..30_000 => Some(5_000 + at),
-        ..36_000 => None,
+        30_000..36_000 => None,
         _ => Some(at - 1_000),
     });
     assert_eq!(paused, ":\n  simulation_paused at 29 s: 6.1 s\n");

@@ -89,6 +89,47 @@ fn a_node_that_declares_its_parameters_again_has_restarted() {
 }
 
 #[test]
+fn numbers_that_start_over_at_once_are_a_restart() {
+    let found = |times: &[(i64, i64)]| {
+        let mut bag = minute(&[]);
+        stamped(&mut bag, "/lidar", "/scan", times);
+        bag.messages.sort_by_key(|m| m.1);
+        shown(&bag)
+    };
+    let quick = found(&[(0, 30_000), (30_100, 60_000)]);
+    assert_eq!(quick, "      00:29.9  /lidar restarted\n");
+    // Numbers that were never high are those of messages out of order.
+    assert_eq!(found(&[(0, 1_000), (1_100, 60_000)]), "");
+}
+
+#[test]
+fn a_node_was_away_only_for_as_long_as_rhythms_show() {
+    let found = |end: i64, begin: i64| {
+        let mut bag = minute(&[]);
+        stamped(&mut bag, "/arm", "/state", &[(0, end), (begin, 60_000)]);
+        let second = |at: i64| (at - ORIGIN) / (1000 * MILLISECOND);
+        bag.messages.retain(|(publisher, at, _)| {
+            *publisher == 0
+                || !(10..45).contains(&second(*at))
+                || *at == ORIGIN + 20_000 * MILLISECOND
+        });
+        bag.messages.sort_by_key(|m| m.1);
+        shown(&bag)
+    };
+    let regular = found(9_000, 45_000);
+    assert!(
+        regular.contains("/arm restarted, away for 36.1 s"),
+        "{regular}"
+    );
+    // After its rhythm, it sent a last message at 20 s.
+    let unclear = found(21_000, 45_000);
+    assert!(
+        unclear.contains("00:20–00:45  /arm restarted\n"),
+        "{unclear}"
+    );
+}
+
+#[test]
 fn a_pause_of_the_recorder_is_no_restart() {
     if let Some(bag) = shared("data/bags/mission/mission.bag") {
         let holes = [65_100, 130_300, 260_600];

@@ -1,6 +1,8 @@
 //! Tests of what shows a start or an end, and what does not.
 
 use crate::causes::{at, minute, shown};
+use crate::edges::log1;
+use crate::pairs::LOG;
 use crate::support::{ORIGIN, Recording};
 
 fn sorted(mut bag: Recording) -> String {
@@ -129,4 +131,44 @@ fn a_pause_of_the_recorder_does_not_hide_an_end() {
     let text = sorted(bag);
     assert!(text.contains("nothing was recorded for 10.1 s"), "{text}");
     assert!(text.contains("/a stopped"), "{text}");
+}
+
+#[test]
+fn a_recorder_of_all_topics_dates_the_birth_of_each() {
+    let text = |found: &[(i64, &str)]| {
+        let mut bag = minute(&[]);
+        let log = bag.publisher("/record_1", "/rosout", "rosgraph_msgs/Log");
+        LOG.clone_into(&mut bag.publishers[log].definition);
+        for (second, topic) in found {
+            let text = format!("Subscribing to {topic}");
+            let record = log1("/record_1", &text, "/src/recorder.cpp", &[]);
+            at(&mut bag, log, *second, record);
+        }
+        for (node, from) in [("/early", 30_000), ("/late", 40_000)] {
+            let place = bag.publisher(node, &format!("{node}/out"), "std_msgs/Empty");
+            bag.send(place, (from, 60_000), 100, &[]);
+        }
+        sorted(bag)
+    };
+    let known = text(&[(0, "/early/out"), (20, "/late/out")]);
+    assert!(!known.contains("/early started"), "{known}");
+    assert!(known.contains("00:20.0  /late started"), "{known}");
+    // One that is given a list names all topics at once.
+    let listed = text(&[(0, "/early/out"), (0, "/late/out")]);
+    assert!(listed.contains("00:30.0  /early started"), "{listed}");
+    assert!(listed.contains("00:40.0  /late started"), "{listed}");
+}
+
+#[test]
+fn a_topic_of_unnamed_senders_begins_only_with_many_messages() {
+    let text = |sent: (i64, i64), period: i64| {
+        let mut bag = Recording::default();
+        for (topic, span, period) in [("/beat", (0, 60_000), 100), ("/keys", sent, period)] {
+            let place = bag.publisher("", topic, "std_msgs/msg/Empty");
+            bag.send(place, span, period, &[0, 1, 0, 0]);
+        }
+        shown(&bag)
+    };
+    assert_eq!(text((20_000, 25_000), 100), "");
+    assert!(text((20_000, 60_000), 100).contains("/keys appeared"));
 }

@@ -73,7 +73,8 @@ pub(crate) const SPEED_FEWEST: (usize, usize) = (5, 3);
 
 // ---- Starts and restarts.
 
-/// The largest number of a log record that shows a start: the first record of a process.
+/// The number of the first log record of a process. It shows a start, unless the node is known to have been there before, since it may
+/// be silent for minutes; if another one follows it, that is of another process.
 pub(crate) const FIRST_RECORD: u32 = 1;
 /// The largest number in the header of the first message that a recorder gets of a publisher that has just begun: it
 /// connects within a second, and misses a few.

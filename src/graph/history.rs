@@ -411,6 +411,33 @@ impl LongestPauses {
 mod tests {
     use super::*;
 
+    /// The silences, in seconds, of a sender that sends at 10 Hz for these seconds.
+    fn silent(sent: &[(i64, i64)]) -> Vec<i64> {
+        let second = |s: i64| Stamp(s * 1_000_000_000);
+        let stretch = |(from, to): &(i64, i64)| Stretch {
+            first: second(*from),
+            last: second(*to),
+            count: 10 * to.abs_diff(*from) + 1,
+            period: 100_000_000,
+            is_even: true,
+            is_joined: false,
+        };
+        let all: Vec<Stretch> = sent.iter().map(stretch).collect();
+        let whole = Span::new(all[0].first, all[all.len() - 1].last);
+        let found = silences(&all, &[whole], &[]).into_iter();
+        found.map(|(from, _)| from.0 / 1_000_000_000).collect()
+    }
+
+    #[test]
+    fn a_silence_is_none_among_others_as_long() {
+        assert_eq!(silent(&[(0, 100), (105, 300)]), [100]);
+        assert_eq!(silent(&[(0, 100), (105, 200), (220, 400)]), [100, 200]);
+        let often = [(0, 100), (105, 200), (204, 300), (305, 400), (404, 500)];
+        assert!(silent(&often).is_empty());
+        // Bursts.
+        assert!(silent(&[(0, 10), (60, 70), (190, 200)]).is_empty());
+    }
+
     #[test]
     fn the_longest_pauses_are_kept_in_order() {
         let mut pauses = LongestPauses::default();

@@ -12,7 +12,7 @@ use crate::base::time::Stamp;
 use crate::base::words;
 use crate::graph::{Element, Elements, NodeId, TopicId, Wiring};
 use crate::mission::Mission;
-use crate::mission::event_log::{Detail, EventId, EventLog, Kind, Parts, interrupted};
+use crate::mission::event_log::{Detail, Event, EventId, EventLog, Kind, Parts, interrupted};
 
 /// The largest length of a name in characters; longer ones would fill a headline alone.
 const LONGEST_NAME: usize = 48;
@@ -112,7 +112,7 @@ impl<'a> CaptionWriter<'a> {
         frame.note = self.note(frame, after);
     }
 
-    fn event(&self, id: EventId) -> Option<&'a crate::mission::event_log::Event> {
+    fn event(&self, id: EventId) -> Option<&'a Event> {
         self.log.events.get(id)
     }
 
@@ -233,7 +233,7 @@ impl<'a> CaptionWriter<'a> {
             Kind::Silent => Said::new(3, ' ', name, "falls silent"),
             Kind::Started => Said::new(4, '+', name, "starts"),
             Kind::Restarted => {
-                let away = event.and_then(|e| e.lasted()).map(words::duration);
+                let away = event.and_then(Event::lasted).map(words::duration);
                 let tail = away.map_or("restarts".to_owned(), |away| {
                     format!("restarts after {away}")
                 });

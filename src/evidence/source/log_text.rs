@@ -241,7 +241,10 @@ pub(crate) fn conclude_births(source: SourceId, known: &mut Conclusions<'_>) {
         let (Some(birth), false) = (times.first().copied(), is_list) else {
             continue;
         };
-        if times.iter().any(|time| is_later(birth, &time)) {
+        // A recorder that starts finds what is there in its first seconds.
+        let late = birth.since(known.mission.0);
+        let is_unclear = (FOUND_NS..2 * FOUND_NS).contains(&late);
+        if is_unclear || times.iter().any(|time| is_later(birth, &time)) {
             continue;
         }
         let mut streams = known.streams.iter().filter(|stream| stream.topic == topic);

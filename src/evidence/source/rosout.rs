@@ -24,9 +24,7 @@ pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
     context.states(Observation::Node(node), logs);
     let log = context.stream.topic;
     if is_log(context.stream.connection.topic.as_str()) {
-        if std::env::var_os("NOFIRST").is_none()
-            && record.number.is_some_and(|number| number <= FIRST_RECORD)
-        {
+        if record.number.is_some_and(|number| number <= FIRST_RECORD) {
             let begins = || format!("{name} logs its first record: {text}");
             context.states(Observation::Begins(node), begins);
         }
@@ -238,8 +236,26 @@ pub(crate) fn conclude_ros2(source: SourceId, known: &mut Conclusions<'_>) {
             signs,
             ends: Vec::new(),
         };
-        known.add(Inference::new(source, what, Confidence::Stated, when));
+        let is_generated = generated(&logger) == Some(node);
+        let confidence = if is_generated {
+            Confidence::Inferred
+        } else {
+            Confidence::Stated
+        };
+        known.add(Inference::new(source, what, confidence, when));
     }
+}
+
+/// The node of a generated name above a logger, such as `/moveit_3408157914`, since namespaces have no such numbers; `None` if the
+/// logger is the node itself, or there is none.
+fn generated(logger: &str) -> Option<&str> {
+    let mut ends = logger.match_indices('/').map(|(at, _)| &logger[..at]);
+    ends.find(|above| {
+        let number = above.rsplit_once('_').map_or("", |(_, number)| number);
+        number.len() >= 4
+            && number.bytes().all(|b| b.is_ascii_hexdigit())
+            && number.contains(|c: char| c.is_ascii_digit())
+    })
 }
 
 /// The node that a logger belongs to. Shorter names come first, so that a part finds its node.
@@ -253,7 +269,7 @@ fn owner<'a>(logger: &'a str, nodes: &BTreeSet<Arc<str>>) -> &'a str {
     }
     match logger.rsplit_once('/') {
         Some((node, part)) if !node.is_empty() && PARTS.contains(&part) => node,
-        _ => logger,
+        _ => generated(logger).unwrap_or(logger),
     }
 }
 
@@ -295,6 +311,20 @@ fn add_rule(source: SourceId, known: &mut Conclusions<'_>, space: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_generated_name_above_a_logger_is_a_node() {
+        let moveit = "/moveit_3408157914/moveit/ros/manager";
+        assert_eq!(generated(moveit), Some("/moveit_3408157914"));
+        for other in [
+            "/robot_1/camera",
+            "/camera_5580",
+            "/map_face/tf2",
+            "/local_costmap/local_costmap",
+        ] {
+            assert_eq!(generated(other), None, "{other}");
+        }
+    }
 
     #[test]
     fn rospy_is_recognized_by_a_file_without_folder() {

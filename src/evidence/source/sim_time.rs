@@ -10,8 +10,7 @@ use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
 use crate::evidence::message::dynamic::MessageLayout;
 use crate::evidence::numbers::Number;
 use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
-use crate::evidence::source::SourceContext;
-use crate::evidence::source::parameters::ParameterEvent;
+use crate::evidence::source::{ParameterEvent, SourceContext};
 
 /// `rosgraph_msgs/Clock`.
 pub(crate) const CLOCK: MessageLayout = MessageLayout {

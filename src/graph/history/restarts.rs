@@ -360,7 +360,8 @@ fn falls_of(
             to.0.since(from.0) < GAP_NS && from.1 == to.1 && numbers.is_some_and(is_high)
         };
         let between = between_records(recorded, &streams);
-        let between = between.filter(|(from, to)| is_log || is_quick(*from, *to));
+        let between = between
+            .filter(|(from, to)| is_log && to.0.since(from.0) >= GAP_NS || is_quick(*from, *to));
         breaks.extend(between.map(|places| (places, Vec::new())));
         for (((last, before), (next, after)), gaps) in breaks {
             let number = |at: usize, time| recorded.numbers.some(at)?.at(time);

@@ -474,6 +474,28 @@ mod tests {
     }
 
     #[test]
+    fn rates_are_exact_by_a_coarse_clock() {
+        // Eight times a second by a clock of 10 ms, and 15, then 30 times a second by one of 25 ms.
+        let coarse = |hz: &[(i64, i64)], tick: i64| {
+            let mut at = 0;
+            let mut all = vec![Stamp(0)];
+            for (many, hz) in hz {
+                for _ in 0..*many {
+                    at += 1_000_000_000 / hz;
+                    all.push(Stamp(at / tick * tick));
+                }
+            }
+            stretches(&all)
+        };
+        let eight = coarse(&[(400, 8)], 10_000_000);
+        assert!((eight[0].hz() - 8.0).abs() < 0.01, "{eight:?}");
+        let faster = coarse(&[(300, 15), (300, 30)], 25_000_000);
+        let rates: Vec<f64> = faster.iter().map(|s| libm::round(s.hz())).collect();
+        assert_eq!(rates, [15.0, 30.0], "{faster:?}");
+        assert!(faster.iter().all(|s| s.is_even), "{faster:?}");
+    }
+
+    #[test]
     fn random_arrivals_are_not_even() {
         let mut at = 0;
         let mut noise = 12_345_i64;

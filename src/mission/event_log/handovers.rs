@@ -215,6 +215,23 @@ mod tests {
     }
 
     #[test]
+    fn a_fast_sender_may_overlap_for_two_seconds() {
+        let fast = |role, node, first, last| {
+            let mut one = sends(role, node, first, last);
+            one.sent.period = SECOND / 50;
+            one
+        };
+        let found = |first| {
+            let all = [
+                fast("/a", NodeId(0), 0, 50),
+                fast("/b", NodeId(1), first, 90),
+            ];
+            replaced(&all, Stamp(100 * SECOND)).len()
+        };
+        assert_eq!([48, 47].map(found), [1, 0]);
+    }
+
+    #[test]
     fn a_hand_over_overlaps_by_a_few_messages_at_most() {
         assert_eq!(found((0, 50), (48, 90)), 1);
         assert_eq!(found((0, 50), (46, 90)), 0);

@@ -215,18 +215,12 @@ pub(crate) struct InterruptionRow<'a> {
     time_ns: Stamp,
     kind: Text<'a>,
     length_ns: i64,
-    #[serde(default = "usual", skip_serializing_if = "is_usual")]
-    percent: u32,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    percent: Option<u32>,
 }
 
 /// The speed, in percent, of everything but a simulation.
-fn usual() -> u32 {
-    100
-}
-
-fn is_usual(percent: &u32) -> bool {
-    *percent == usual()
-}
+const USUAL: u32 = 100;
 
 impl From<&Interruption> for InterruptionRow<'_> {
     fn from(one: &Interruption) -> Self {
@@ -234,7 +228,7 @@ impl From<&Interruption> for InterruptionRow<'_> {
             time_ns: one.time,
             kind: one.kind.word().into(),
             length_ns: one.length,
-            percent: one.percent,
+            percent: Some(one.percent).filter(|percent| *percent != USUAL),
         }
     }
 }
@@ -246,7 +240,7 @@ pub(crate) fn interruptions(rows: &[InterruptionRow<'_>]) -> Vec<Interruption> {
             time: row.time_ns,
             kind: InterruptionKind::from_word(&row.kind)?,
             length: row.length_ns.max(0),
-            percent: row.percent,
+            percent: row.percent.unwrap_or(USUAL),
         })
     };
     let mut all: Vec<Interruption> = rows.iter().filter_map(one).collect();
