@@ -7,11 +7,13 @@ use clap::{Args, ValueEnum};
 
 use super::applies::{self, Given};
 use super::args::{GraphArgs, Inputs, RangeArgs, RateArgs, reading};
+use super::gate::wrote;
 use super::terminal::Terminal;
 use super::values::{one_of, phases};
 use super::{DONE, SKIPPED, code};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
+use crate::base::words::Worded as _;
 use crate::export::check::check as check_targets;
 use crate::export::tables::TableFormat;
 use crate::export::target::Target;
@@ -55,17 +57,6 @@ pub(super) enum InfoFormat {
 }
 
 impl InfoFormat {
-    /// The format of an extension.
-    fn of(extension: &str) -> Option<Self> {
-        Some(match extension {
-            "txt" => Self::Text,
-            "json" => Self::Json,
-            "csv" => Self::Csv,
-            "parquet" => Self::Parquet,
-            _ => return None,
-        })
-    }
-
     /// The summary of a mission, or the survey of a folder, in this format.
     ///
     /// # Errors
@@ -86,23 +77,30 @@ impl InfoFormat {
     }
 }
 
-/// The outputs by their extensions; only standard output, in the default format, without any.
+/// The outputs by their extensions; only standard output, in the default format, without any. Refuses to overwrite an input.
 fn outputs<F: Copy>(
-    given: &[OsString],
-    default: F,
-    of: fn(&str) -> Option<F>,
+    (given, default): (&[OsString], F),
+    of: impl Fn(&str) -> Option<F>,
     hint: &str,
+    reading: &Reading,
 ) -> Result<Vec<(Target, F)>> {
-    if given.is_empty() {
-        return Ok(vec![(Target::Stdout, default)]);
-    }
     let output = |name: &OsString| {
         let target = Target::parse(name);
-        let format = target.extension().and_then(|extension| of(&extension));
+        let word = match target.extension().as_deref() {
+            Some("txt") => "text".to_owned(),
+            Some("md") => "markdown".to_owned(),
+            other => other.unwrap_or_default().to_owned(),
+        };
         let what = || format!("`{}` has no known extension", name.display());
-        Ok((target, format.ok_or_else(|| Error::usage(what(), hint))?))
+        Ok((target, of(&word).ok_or_else(|| Error::usage(what(), hint))?))
     };
-    given.iter().map(output).collect()
+    let mut all: Vec<(Target, F)> = given.iter().map(output).collect::<Result<_>>()?;
+    let targets: Vec<Target> = all.iter().map(|(target, _)| target.clone()).collect();
+    check_targets(&targets, &reading.files())?;
+    if all.is_empty() {
+        all.push((Target::Stdout, default));
+    }
+    Ok(all)
 }
 
 #[derive(Debug, Args)]
@@ -186,7 +184,12 @@ pub(super) fn events(args: &EventsArgs, given: &Given, terminal: &mut Terminal) 
             .note("elements that only source code declares have no times and are not in the log");
     }
     let hint = "write `x.txt`, `x.csv`, `x.ndjson`, `x.json` or `x.md`";
-    let outputs = outputs(&args.outputs, args.format, LogFormat::of, hint)?;
+    let of = |word: &str| {
+        LogFormat::ALL
+            .into_iter()
+            .find(|format| format.word() == word)
+    };
+    let outputs = outputs((&args.outputs, args.format), of, hint, &reading)?;
     let mut logs = Logs {
         options: LogOptions {
             parts: args.parts,
@@ -198,7 +201,6 @@ pub(super) fn events(args: &EventsArgs, given: &Given, terminal: &mut Terminal) 
         shown: Vec::new(),
         notices: Notices::new(),
     };
-    may_write(&logs.outputs, &reading)?;
     let folder = folder(&args.inputs, &reading);
     match folder {
         None => logs.add(None, &read(&reading, terminal)?),
@@ -230,7 +232,11 @@ pub(super) fn events(args: &EventsArgs, given: &Given, terminal: &mut Terminal) 
             terminal.note(NO_EVENTS);
         }
     }
-    wrote(&logs.outputs, "the event log", terminal);
+    wrote(
+        logs.outputs.iter().map(|(target, _)| target),
+        "the event log",
+        terminal,
+    );
     terminal.notices(&logs.notices);
     Ok(if logs.notices.any_loss() {
         SKIPPED
@@ -247,17 +253,6 @@ fn folder<'a>(inputs: &'a Inputs, reading: &Reading) -> Option<&'a Path> {
     }
 }
 
-/// Refuses to overwrite an input, or to write a file twice.
-fn may_write<F>(outputs: &[(Target, F)], reading: &Reading) -> Result<()> {
-    let targets: Vec<Target> = outputs.iter().map(|(target, _)| target.clone()).collect();
-    check_targets(&targets, &reading.files())
-}
-
-/// Prints the files written.
-fn wrote<F>(outputs: &[(Target, F)], what: &str, terminal: &mut Terminal) {
-    super::gate::wrote(outputs.iter().map(|(target, _)| target), what, terminal);
-}
-
 /// Prints or writes the summary of a mission, or a row for each bag of a folder.
 pub(super) fn info_of(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     let mut reading = reading(&args.inputs, &args.graph)?;
@@ -265,14 +260,14 @@ pub(super) fn info_of(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -
     reading.division.length = Length::Parts(PARTS);
     applies::check_inputs(given, &reading)?;
     let hint = "write `x.txt`, `x.json`, `x.csv` or `x.parquet`";
-    let outputs = outputs(&args.outputs, args.format, InfoFormat::of, hint)?;
+    let of = |word: &str| InfoFormat::from_str(word, false).ok();
+    let outputs = outputs((&args.outputs, args.format), of, hint, &reading)?;
     if outputs
         .iter()
         .any(|(_, format)| *format == InfoFormat::Parquet)
     {
         TableFormat::Parquet.built()?;
     }
-    may_write(&outputs, &reading)?;
     let folder = folder(&args.inputs, &reading);
     if !args.why.is_empty() {
         if folder.is_some() {
@@ -306,7 +301,11 @@ pub(super) fn info_of(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -
             (file, _) => put(file, &bytes)?,
         }
     }
-    wrote(&outputs, "the summary", terminal);
+    wrote(
+        outputs.iter().map(|(target, _)| target),
+        "the summary",
+        terminal,
+    );
     terminal.notices(&notices);
     Ok(code)
 }

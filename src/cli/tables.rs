@@ -32,12 +32,7 @@ pub(super) struct ExtractArgs {
     #[arg(long)]
     fields: bool,
     /// Folder of `.msg`, `.srv`, `.action` and `.idl` files for types that the bag does not define (repeatable; common types are built in).
-    #[arg(
-        long,
-        visible_alias = "source",
-        value_name = "DIR",
-        requires = "fields"
-    )]
+    #[arg(long, value_name = "DIR", requires = "fields")]
     msg_path: Vec<PathBuf>,
     /// Topics to export, as `rqt_graph` filters: `/nav/.*,-/nav/debug`.
     #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]

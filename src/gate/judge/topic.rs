@@ -352,7 +352,7 @@ impl Judge<'_> {
         let name = self.facts.topic(topic);
         let text = format!("cannot tell the rate of {name}: it has no whole window to check");
         let finding = Finding::unknown(FindingKind::TopicRateLow, name, at, text);
-        finding.hints(["use a shorter period: `period: 5s`, or `--period 5`"])
+        finding.hints(["use a shorter period in the expectations file: `period: 5s`"])
     }
 
     /// The windows in which a topic is checked.

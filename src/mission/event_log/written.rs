@@ -33,20 +33,6 @@ worded! {
     }
 }
 
-impl LogFormat {
-    /// The format of a file extension.
-    pub(crate) fn of(extension: &str) -> Option<Self> {
-        Some(match extension {
-            "txt" => Self::Text,
-            "csv" => Self::Csv,
-            "ndjson" => Self::Ndjson,
-            "json" => Self::Json,
-            "md" => Self::Markdown,
-            _ => return None,
-        })
-    }
-}
-
 /// Options for the events of a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LogOptions {
