@@ -251,7 +251,7 @@ fn parts_are_read_in_order_of_time_whatever_their_names() {
                 .map(|line| printed(dir.path(), line, "run"))
         });
         assert!(
-            all[0][0].contains("00:09.9 of mission, 110 messages"),
+            all[0][0].contains("00:09.9 long, 110 messages"),
             "{}",
             all[0][0]
         );
@@ -326,7 +326,7 @@ fn a_recording_beside_its_compressed_copy_is_one_part() {
             }
             let text = printed(dir.path(), "info F", ".");
             assert!(text.starts_with("Some(0)\n\n"), "{text}");
-            assert!(text.contains("00:14.9 of mission, 150 messages"), "{text}");
+            assert!(text.contains("00:14.9 long, 150 messages"), "{text}");
         }
     }
 }
