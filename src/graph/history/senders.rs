@@ -361,9 +361,9 @@ fn quartiles(times: &[Stamp], many: usize) -> ([i64; 3], i64) {
     let sums = times.iter().zip(times.iter().skip(many));
     let mut sums: Vec<i64> = sums.map(|(a, b)| b.since(*a)).collect();
     let many = sums.len();
-    if many == 0 {
+    let (Some(&first), Some(&last)) = (sums.first(), sums.last()) else {
         return ([0; 3], 0);
-    }
+    };
     let mut quartile = |part: usize| *sums.select_nth_unstable((many * part / 4).min(many - 1)).1;
     let quartiles = [quartile(1), quartile(2), quartile(3)];
     let median = quartiles[1];
@@ -373,9 +373,13 @@ fn quartiles(times: &[Stamp], many: usize) -> ([i64; 3], i64) {
         .filter(|sum| (median / 2..=median / 2 * 3).contains(*sum));
     let usual = mean(near.fold((0, 0), |all, sum| (all.0.saturating_add(*sum), all.1 + 1))).max(1);
     let lasts = |sum: i64| sum.saturating_add(usual / 2) / usual;
-    let exact = mean(sums.iter().fold((0, 0), |all, sum| {
+    // The first and the last may belong to the rates before and after.
+    let ends = if many > FEWEST_INTERVALS { 1 } else { 0 };
+    let inner = sums.iter().fold((0_i64, 0), |all, sum| {
         (all.0.saturating_add(*sum), all.1 + lasts(*sum))
-    }));
+    });
+    let outer = (first.saturating_add(last), lasts(first) + lasts(last));
+    let exact = mean((inner.0 - ends * outer.0, inner.1 - ends * outer.1));
     (quartiles, exact)
 }
 
@@ -493,6 +497,18 @@ mod tests {
         let rates: Vec<f64> = faster.iter().map(|s| libm::round(s.hz())).collect();
         assert_eq!(rates, [15.0, 30.0], "{faster:?}");
         assert!(faster.iter().all(|s| s.is_even), "{faster:?}");
+    }
+
+    #[test]
+    fn the_interval_between_two_rates_belongs_to_neither() {
+        // Once a second, then every five seconds after one of 5.8.
+        let seconds = (0..20)
+            .map(|s| s * 10)
+            .chain((0..12).map(|k| 190 + 58 + k * 50));
+        let times: Vec<Stamp> = seconds.map(|tenths| Stamp(tenths * 100_000_000)).collect();
+        let rates: Vec<f64> = stretches(&times).iter().map(Stretch::hz).collect();
+        assert_eq!(rates.len(), 2, "{rates:?}");
+        assert!((rates[1] - 0.2).abs() < 1e-6, "{rates:?}");
     }
 
     #[test]
