@@ -98,7 +98,10 @@ fn the_evidence_of_an_edge_includes_conclusions() {
 #[test]
 fn info_suggests_a_figure_that_fits() {
     let words = |inputs| -> Vec<&str> { shown(inputs).figures.iter().map(|f| f.figure).collect() };
-    assert_eq!(words(example("warehouse.bag")), ["lives", "graph", "steps"]);
+    assert_eq!(
+        words(example("warehouse.bag")),
+        ["lives", "graph", "holders", "steps"]
+    );
     // One log record and one scan: no connection is known.
     let (_folder, inputs) = recorded();
     let info = shown(inputs);

@@ -116,7 +116,7 @@ fn why_begins_with_who_publishes_and_when() {
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(
         lines[1],
-        "  published by /robot1/controller 00:38–02:56, /robot1/emergency_stop 01:37–02:36 and /robot1/dock_controller 04:59–"
+        "  published by /robot1/controller 00:38–02:56, /robot1/emergency_stop 01:37–02:36 and /robot1/dock_controller 04:58–"
     );
     assert_eq!(lines[2], "  received by /robot1/base_driver throughout");
     // The recorder's evidence is the last.

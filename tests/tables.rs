@@ -236,7 +236,7 @@ fn recordings_without_definitions_use_common_and_given_types() {
     fs::remove_file(dir.path().join("ws/my_msgs/msg/Thing.msg")).unwrap();
     let idl = "module my_msgs {\n  module msg {\n    struct Thing {\n      string data;\n    };\n  };\n};\n";
     fs::write(dir.path().join("ws/my_msgs/msg/Thing.idl"), idl).unwrap();
-    let defined = [&only[..], &["--format", "csv", "--source", "ws"]].concat();
+    let defined = [&only[..], &["--format", "csv", "--msg-path", "ws"]].concat();
     ends(dir.path(), &defined, 0);
     assert_eq!(csv(&dir.path().join("new/er/thing.csv")), thing);
     let none = [&args[..], &["--topic-filter", "/nothing"]].concat();

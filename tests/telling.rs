@@ -95,8 +95,8 @@ fn a_crash_is_drawn_before_during_and_after() {
     let said = |mark, words: &str, note: &str| (mark, words.to_owned(), note.to_owned());
     let missed = "arm_controller and grasp_planner get no detections";
     assert_eq!(of(25).0, None);
-    let gone = format!("/robot1 · 4:26 · {missed}");
-    let away = format!("/robot1 · since 4:26 · {missed}");
+    let gone = format!("4:26 · {missed}");
+    let away = format!("since 4:26 · {missed}");
     assert_eq!(
         of(26),
         said(Some(Mark::Removed), "− object_detector goes away", &gone)
@@ -106,7 +106,7 @@ fn a_crash_is_drawn_before_during_and_after() {
         said(Some(Mark::Away), "object_detector still away", &away)
     );
     let back = "object_detector back after 15.6 s";
-    assert_eq!(of(28), said(Some(Mark::Restarted), back, "/robot1 · 4:41"));
+    assert_eq!(of(28), said(Some(Mark::Restarted), back, "4:41"));
     // If both ends are in one window, it is a restart there.
     let minutes = example("warehouse.bag", Some("60"));
     let words = minutes.frames[4].words(usize::MAX);

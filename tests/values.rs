@@ -100,11 +100,30 @@ fn rendering_exported_json_gives_the_same_bytes() {
         assert!(first.keys().eq(second.keys()), "{bag:?}: other files");
         for (name, bytes) in &first {
             assert!(
-                second[name] == *bytes,
+                without_texts(&second[name]) == without_texts(bytes),
                 "{command} {bag:?} {drawing:?}: another {name}"
             );
         }
     }
+}
+
+/// A page without the texts that nodes logged, which a mission's JSON does not contain; other files as they are.
+fn without_texts(file: &[u8]) -> Vec<u8> {
+    const START: &str = "\"lives\":";
+    let page = str::from_utf8(file).unwrap_or_default();
+    let data = page.find("application/json");
+    let Some(at) = data.and_then(|at| Some(at + page[at..].find(START)? + START.len())) else {
+        return file.to_vec();
+    };
+    let mut lives = serde_json::Deserializer::from_str(&page[at..]).into_iter();
+    let mut all: serde_json::Value = lives.next().unwrap().unwrap();
+    let end = at + lives.byte_offset();
+    for life in all.as_array_mut().unwrap().iter_mut() {
+        for signs in life[1].as_array_mut().unwrap() {
+            signs[3] = serde_json::Value::Null;
+        }
+    }
+    format!("{}{all}{}", &page[..at], &page[end..]).into_bytes()
 }
 
 /// A command, a bag, how it is read, the files, how it is drawn.
@@ -152,7 +171,7 @@ fn windows(arguments: &[&str]) -> Vec<(i64, i64)> {
 fn windows_are_cut_by_phases_or_changes() {
     let phases = windows(&["--cut", "phases"]);
     let starts: Vec<i64> = phases.iter().map(|(start, _)| *start).collect();
-    assert_eq!(starts, [0, 38, 97, 163, 177, 200, 296]);
+    assert_eq!(starts, [0, 37, 97, 162, 177, 200, 296]);
     let changes = windows(&["--cut", "changes"]);
     assert!((15..=40).contains(&changes.len()), "{changes:?}");
     assert!(

@@ -341,11 +341,12 @@ pub(crate) fn silences(stretches: &[Stretch], lives: &[Span], pauses: &[Span]) -
         }
     }
     let sending: i64 = stretches.iter().map(|s| s.last.since(s.first)).sum();
-    let quiet: i64 = found
+    let ended = found
         .iter()
-        .filter_map(|(from, to)| Some((*to)?.since(*from)))
-        .sum();
-    if found.len() > OFTEN && quiet > sending / 4 || found.len() > 1 && quiet > sending {
+        .filter_map(|(from, to)| Some((*to)?.since(*from)));
+    let (ended, quiet) = ended.fold((0, 0), |(many, all), own| (many + 1, all + own));
+    // Between bursts, of which two are not a habit.
+    if found.len() > OFTEN && quiet > sending / 4 || ended > 1 && quiet > sending {
         found.clear();
     }
     found

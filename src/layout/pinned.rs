@@ -19,7 +19,9 @@ pub(crate) fn kept(plan: &Plan, known: &[Option<Rect>], orientation: Orientation
     };
     for (v, vertex) in plan.vertices.iter().enumerate() {
         let old = known.get(v).copied().flatten().filter(is_sane);
-        let place = old.map(|old| Rect::around(old.centre(), vertex.size));
+        // It may have grown for its lines.
+        let size = |old: Rect| Size::new(vertex.size.w.max(old.w), vertex.size.h.max(old.h));
+        let place = old.map(|old| Rect::around(old.centre(), size(old)));
         table.boxes[v] = place.filter(|place| table.is_free(place, 0.0));
     }
     let mut neighbours = vec![Vec::new(); plan.vertices.len()];

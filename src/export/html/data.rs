@@ -10,6 +10,7 @@ use super::{HtmlPage, PageGraph};
 use crate::base::cast;
 use crate::base::digest;
 use crate::base::geometry::Rect;
+use crate::base::ids::grouped;
 use crate::base::name::is_log;
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
@@ -262,6 +263,10 @@ const MOST_TEXTS: usize = 3;
 fn last_signs(mission: &Mission, changes: &PageChanges) -> Vec<(u32, Vec<LastSigns>)> {
     let (elements, clock) = (&mission.elements, changes.clock);
     let topic = |id| elements.topics.get(id).map_or("", |t| t.name.as_str());
+    let senders = mission.sending.senders.iter();
+    let senders = senders.filter(|s| !is_log(topic(s.topic)));
+    let senders = grouped(senders.filter_map(|s| Some((s.node?, s))));
+    let texts = grouped(mission.logged.iter().rev().map(|t| (&*t.logger, t)));
     let of = |(id, node): (NodeId, &Node)| {
         let life = |life: &Span| {
             let last = |sender: &Sender| {
@@ -269,11 +274,12 @@ fn last_signs(mission: &Mission, changes: &PageChanges) -> Vec<(u32, Vec<LastSig
                 let last = own.find(|s| life.contains(s.first))?.last;
                 Some((clock.secs(last), visible(topic(sender.topic)).into_owned()))
             };
-            let own = mission.sending.senders.iter();
-            let own = own.filter(|s| s.node == Some(id) && !is_log(topic(s.topic)));
-            let last = own.filter_map(last).max_by(|a, b| a.0.total_cmp(&b.0));
-            let texts = mission.logged.iter().rev();
-            let texts = texts.filter(|t| &*t.logger == node.name.as_str() && life.contains(t.time));
+            let own = senders.get(&id).into_iter().flatten();
+            let last = own
+                .filter_map(|s| last(s))
+                .max_by(|a, b| a.0.total_cmp(&b.0));
+            let own = texts.get(node.name.as_str()).into_iter().flatten();
+            let texts = own.filter(|t| life.contains(t.time));
             let texts = texts.map(|t| (clock.secs(t.time), visible(&t.text).into_owned()));
             let (start, end) = (clock.secs(life.start), clock.secs(life.end));
             LastSigns(start, end, last, texts.take(MOST_TEXTS).collect())

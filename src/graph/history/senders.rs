@@ -345,10 +345,11 @@ fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
         first,
         last,
         count: times.len() as u64,
+        // Of few intervals the median is closer than a mean with an odd one.
         period: match is_even {
-            true => usual,
+            true if is_many => usual,
             false if are_sums_even => of_two / 2,
-            false => median,
+            _ => median,
         },
         is_even: is_even || are_sums_even,
         is_joined,

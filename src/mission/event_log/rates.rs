@@ -7,7 +7,7 @@ use super::drafts::{Drafts, LogInput};
 use super::{Detail, Kind};
 use crate::base::rhythm::{ABOUT_NONE, FEWEST_OF_RATE, RATE_HOLDS_NS, RATE_PAUSE_NS};
 use crate::graph::Element;
-use crate::graph::history::{Bound, Sender, Stretch, strays};
+use crate::graph::history::{Bound, Sender, Stretch, hide, strays};
 
 /// The error of a rate as a fraction of it: a step from 8 to 10 Hz is not more than a quarter.
 const EXACT: f64 = 0.01;
@@ -18,7 +18,8 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     for sender in senders.filter(|v| !v.is_latched && !context.is_by_the_way(v.topic)) {
         for (pair, end) in sender.stretches.windows(2).zip(1..) {
             let (before, after) = (&pair[0], &pair[1]);
-            let is_first = end == strays(&sender.stretches);
+            let gap = (before.last, Some(after.first));
+            let is_first = end == strays(&sender.stretches) && !hide(&context.history.pauses, gap);
             let none = is_first.then(|| about_none(&sender.stretches[..end], after));
             let is_change = changes(before, after, context.rate_change);
             let from_hz = none.flatten().or_else(|| is_change.then(|| before.hz()));
