@@ -375,7 +375,7 @@ fn quartiles(times: &[Stamp], many: usize) -> ([i64; 3], i64) {
     let usual = mean(near.fold((0, 0), |all, sum| (all.0.saturating_add(*sum), all.1 + 1))).max(1);
     let lasts = |sum: i64| sum.saturating_add(usual / 2) / usual;
     // The first and the last may belong to the rates before and after.
-    let ends = if many > FEWEST_INTERVALS { 1 } else { 0 };
+    let ends = i64::from(many > FEWEST_INTERVALS);
     let inner = sums.iter().fold((0_i64, 0), |all, sum| {
         (all.0.saturating_add(*sum), all.1 + lasts(*sum))
     });
