@@ -139,7 +139,7 @@ fn describe(
 const NAMES: usize = 12;
 const TIMES: usize = 3;
 const LOGS: usize = 3;
-/// The time before an end of a node, and after it, in which its warnings may tell why it ended.
+/// The time before an end of a node, and after it, in which its warnings may explain it.
 const LOGGED_NS: (i64, i64) = (60_000_000_000, 5_000_000_000);
 
 /// Who publishes and receives a topic, and when; when a node ran, its topics, and its last warnings before each of its ends.
