@@ -77,8 +77,8 @@ def read(
     The options are those of `bagreel render`; `period` is a text such as `30s`, or a number of seconds.
     """
     period = None if period is None else str(period)
-    options = {"start": start, "end": end, "offset": list(offset), "ns": list(ns), "topology": list(topology)}
-    options |= {"source": source, "infer": infer}
+    options: dict[str, Any] = {"start": start, "end": end, "source": source, "infer": infer}
+    options |= {"offset": list(offset), "ns": list(ns), "topology": list(topology)}
     if not any(options.values()):
         return _bagreel.read(texts(uris), period=period, align=align)
     with tempfile.TemporaryDirectory(prefix="bagreel-") as folder:
