@@ -24,7 +24,7 @@ fn bagreel(folder: &Path, command: &str) -> Output {
         .unwrap()
 }
 
-fn printed(folder: &Path, command: &str) -> String {
+pub(crate) fn printed(folder: &Path, command: &str) -> String {
     String::from_utf8(bagreel(folder, command).stdout).unwrap()
 }
 

@@ -2,11 +2,11 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
 use serde_json::Value;
 
 use crate::causes::shown;
+use crate::questions::printed;
 use crate::support::cdr::Cdr;
 use crate::support::{Recording, mcap};
 
@@ -32,17 +32,7 @@ fn unnamed(bag: &Recording) -> String {
     let mut bag = bag.clone();
     bag.publishers.iter_mut().for_each(|own| own.node.clear());
     fs::write(dir.path().join("r.mcap"), mcap::write(&bag, &options)).unwrap();
-    said(dir.path(), "events r.mcap")
-}
-
-fn said(folder: &Path, command: &str) -> String {
-    let mut run = Command::new(env!("CARGO_BIN_EXE_bagreel"));
-    let done = run
-        .current_dir(folder)
-        .args(command.split(' '))
-        .output()
-        .unwrap();
-    String::from_utf8(done.stdout).unwrap()
+    printed(dir.path(), "events r.mcap")
 }
 
 #[test]
@@ -95,7 +85,7 @@ fn the_recorder_hides_no_topic() {
 /// Both numbers of a topic as JSON of `info`.
 fn numbers(folder: &Path, bag: &str) -> Vec<(String, Option<f64>, Option<f64>)> {
     let info: Value =
-        serde_json::from_str(&said(folder, &format!("info {bag} --format json"))).unwrap();
+        serde_json::from_str(&printed(folder, &format!("info {bag} --format json"))).unwrap();
     let topics = info["topics"].as_array().unwrap().iter();
     let topics = topics.map(|one| {
         let name = one["name"].as_str().unwrap().to_owned();
@@ -111,14 +101,14 @@ fn a_topic_has_one_rate_while_sending_in_every_output() {
     let example = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
     fs::copy(example, here.join("w.bag")).unwrap();
     let numbers = numbers(here, "w.bag");
-    said(here, "render w.bag --period all -o w.md -o w.svg");
-    said(
+    printed(here, "render w.bag --period all -o w.md -o w.svg");
+    printed(
         here,
         "figure w.bag --rows topics --phases none --width 181mm -o lives.svg",
     );
     let read = |name: &str| fs::read_to_string(here.join(name)).unwrap();
     let (report, picture, figure) = (read("w.md"), read("w.svg"), read("lives.svg"));
-    let text = said(here, "info w.bag");
+    let text = printed(here, "info w.bag");
     assert!(text.contains("while sending") && report.contains("Hz while sending"));
     assert!(picture.contains("rates while sending") && figure.contains("while sending"));
     let mut compared = 0;
@@ -165,7 +155,7 @@ fn a_difference_of_rates_is_one_pair_of_numbers_with_its_word() {
     };
     write("a.bag", &steady(100));
     write("b.bag", &steady(200));
-    let text = said(here, "diff a.bag b.bag -o d.html -o d.md");
+    let text = printed(here, "diff a.bag b.bag -o d.html -o d.md");
     assert!(text.contains("10 Hz → 5 Hz while sending"), "{text}");
     let page = fs::read_to_string(here.join("d.html")).unwrap();
     assert!(page.contains("10 → 5 Hz"));
@@ -174,6 +164,6 @@ fn a_difference_of_rates_is_one_pair_of_numbers_with_its_word() {
     let whole: Vec<(i64, i64)> = (0..12).map(|n| (10 * n, 10 * n + 10)).collect();
     write("a.bag", &bursts(&[], &whole));
     write("b.bag", &bursts(&[], &halves));
-    let text = said(here, "diff a.bag b.bag");
+    let text = printed(here, "diff a.bag b.bag");
     assert!(text.contains("over the recording"), "{text}");
 }

@@ -13,7 +13,6 @@ use super::values::{one_of, phases};
 use super::{DONE, SKIPPED, code};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::words::Worded as _;
 use crate::export::check::check as check_targets;
 use crate::export::tables::TableFormat;
 use crate::export::target::Target;
@@ -184,12 +183,12 @@ pub(super) fn events(args: &EventsArgs, given: &Given, terminal: &mut Terminal) 
             .note("elements that only source code declares have no times and are not in the log");
     }
     let hint = "write `x.txt`, `x.csv`, `x.ndjson`, `x.json` or `x.md`";
-    let of = |word: &str| {
-        LogFormat::ALL
-            .into_iter()
-            .find(|format| format.word() == word)
-    };
-    let outputs = outputs((&args.outputs, args.format), of, hint, &reading)?;
+    let outputs = outputs(
+        (&args.outputs, args.format),
+        LogFormat::from_word,
+        hint,
+        &reading,
+    )?;
     let mut logs = Logs {
         options: LogOptions {
             parts: args.parts,

@@ -23,7 +23,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{ById, Element, Elements, Graphs, NodeId, State, TopicId};
 use crate::base::rhythm::{
-    ALIKE, FEWEST, GONE_NS, LONGER, OFTEN, SAME_RATE, STEADY, STEADY_NS, broken_after,
+    ALIKE, FEWEST, FEWEST_OF_RATE, GONE_NS, LONGER, OFTEN, RATE_HOLDS_NS, SAME_RATE, STEADY,
+    STEADY_NS, broken_after,
 };
 use crate::base::time::{Span, Stamp};
 
@@ -110,6 +111,12 @@ impl Stretch {
             mean
         };
         1e9 / period.max(1.0)
+    }
+
+    /// Whether it has a rate that is an event: even, and for long enough.
+    pub(crate) fn has_rate(&self) -> bool {
+        let lasts = self.last.since(self.first) >= RATE_HOLDS_NS;
+        self.is_even && self.count >= FEWEST_OF_RATE && lasts
     }
 }
 
@@ -302,12 +309,9 @@ pub(crate) fn hide(pauses: &[Span], (from, to): Silence) -> bool {
 /// from the last message to the next, or `None` if there is none. A sender of bursts is never silent.
 pub(crate) fn silences(stretches: &[Stretch], lives: &[Span], pauses: &[Span]) -> Vec<Silence> {
     let mut found = Vec::new();
-    let gaps = stretches
-        .windows(2)
-        .map(|pair| (pair[0].last, Some(pair[1].first)));
-    let gaps = gaps.filter(|gap| !hide(pauses, *gap));
-    let gaps = gaps.map(|(from, to)| to.map_or(0, |to| to.since(from)));
-    let gaps: Vec<i64> = gaps.collect();
+    let gaps = stretches.windows(2).map(|p| (p[0].last, p[1].first));
+    let gaps = gaps.filter(|(from, to)| !hide(pauses, (*from, Some(*to))));
+    let gaps: Vec<i64> = gaps.map(|(from, to)| to.since(from)).collect();
     for life in lives {
         let inside = |s: &&Stretch| life.start <= s.first && s.first < life.end;
         let own: Vec<&Stretch> = stretches.iter().filter(inside).collect();
@@ -321,13 +325,11 @@ pub(crate) fn silences(stretches: &[Stretch], lives: &[Span], pauses: &[Span]) -
             }
             let silence = next.unwrap_or(life.end).since(stretch.last);
             let usual = broken_after(stretch.period).max(LONGER.saturating_mul(longest[1]));
-            let comparable = gaps
-                .iter()
-                .filter(|gap| gap.saturating_mul(LONGER) >= silence);
+            let is_alike = |gap: &&i64| gap.saturating_mul(LONGER) >= silence;
             // After a pause, a short silence to the end may be another one.
             let is_open = next.is_none() && longest[0] > 0;
             let least = usual.max(if is_open { GONE_NS } else { 0 });
-            let long = silence > least && comparable.count() <= ALIKE;
+            let long = silence > least && gaps.iter().filter(is_alike).nth(ALIKE).is_none();
             count += stretch.count;
             if count >= FEWEST {
                 longest = [

@@ -43,8 +43,7 @@ impl Change {
 
     /// An element that was not in the previous window.
     fn added(what: Element, time: Option<Stamp>) -> Self {
-        let is_node = what.is_node();
-        let kind = if is_node {
+        let kind = if what.is_node() {
             Kind::Started
         } else {
             Kind::Appeared
@@ -54,8 +53,7 @@ impl Change {
 
     /// An element that was in the previous window and is not in this one.
     fn removed(what: Element, time: Option<Stamp>) -> Self {
-        let is_node = what.is_node();
-        let kind = if is_node {
+        let kind = if what.is_node() {
             Kind::Stopped
         } else {
             Kind::Vanished

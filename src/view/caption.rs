@@ -49,8 +49,8 @@ type Groups = BTreeMap<(u8, [String; 2]), Phrase>;
 impl<'a> CaptionWriter<'a> {
     pub(crate) fn new(mission: &'a Mission, viewed: &'a Viewed<'a>) -> Self {
         let elements = &mission.elements;
-        let nodes = elements.nodes.ids().map(Element::Node);
-        let topics = elements.topics.ids().map(Element::Topic);
+        let mut nodes = elements.nodes.ids().map(Element::Node);
+        let mut topics = elements.topics.ids().map(Element::Topic);
         let names = |all: &mut dyn Iterator<Item = Element>| {
             let seen = all.filter(|what| viewed.sees(*what));
             seen.map(|what| full_name(elements, viewed, what)).collect()
@@ -64,10 +64,7 @@ impl<'a> CaptionWriter<'a> {
             is_still: mission.windows.len() == 1,
             last: None,
             wiring: elements.wiring(|_, _| true),
-            names: [
-                names(&mut nodes.into_iter()),
-                names(&mut topics.into_iter()),
-            ],
+            names: [names(&mut nodes), names(&mut topics)],
         }
     }
 

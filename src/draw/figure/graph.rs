@@ -20,8 +20,8 @@ pub(crate) fn page(sheet: &FigureSheet<'_>, picture: Scene) -> Scene {
     if !source.phases.is_empty() {
         let timeline = Timeline::new(source, Vec::new());
         let place = Rect::new(0.0, y + BELOW, width, 0.0);
-        let mut drawer = Drawer::new(timeline, Density::Paper, &canvas, place);
-        (drawer.axis.right, drawer.rates, drawer.beside) = (width, None, None);
+        let drawer = Drawer::new(timeline, Density::Paper, &canvas, place);
+        let drawer = drawer.without_columns(width);
         y = drawer.ground(&mut canvas);
         canvas.begin("words");
         y = phases::names(&mut canvas, source, width, y);

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::page::{FigureSheet, nothing};
+use super::page::{FigureSheet, drawer, nothing};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::base::name::ShortNames;
@@ -14,7 +14,7 @@ use crate::draw::scene::{Scene, Step, Stroke};
 use crate::draw::style::Color;
 use crate::draw::timeline::Timeline;
 use crate::draw::timeline::canvas::{HAIRLINE, PaperCanvas, Type, ink};
-use crate::draw::timeline::drawer::{Density, Drawer, clock};
+use crate::draw::timeline::drawer::{Drawer, clock};
 use crate::draw::timeline::notes::{flow, sentence};
 use crate::draw::timeline::phases::names;
 use crate::draw::timeline::rows::Row;
@@ -85,7 +85,7 @@ fn lanes(source: &FigureSource<'_>) -> Vec<(TopicId, Vec<Vec<Holder>>)> {
     topics.filter_map(of).collect()
 }
 
-/// The figure, and remarks for the user.
+/// The figure.
 ///
 /// # Errors
 /// [`Error::Usage`] if no topic has several senders, or if they do not fit; the hint suggests what would.
@@ -113,14 +113,7 @@ pub(crate) fn page(sheet: &FigureSheet<'_>) -> Result<Scene> {
     if timeline.rows.len() > sheet.most_rows() {
         return Err(sheet.too_many(&timeline, &timeline.rows, ("--topic-filter", "lane")));
     }
-    let top = if timeline.phases.is_empty() {
-        canvas.sizes.line()
-    } else {
-        0.0
-    };
-    let place = Rect::new(0.0, top, width, 0.0);
-    let mut drawer = Drawer::new(timeline, Density::Paper, &canvas, place);
-    (drawer.axis.right, drawer.rates, drawer.beside) = (width, None, None);
+    let drawer = drawer(timeline, &canvas, width).without_columns(width);
     let end = drawer.ground(&mut canvas);
     let mut first = 0;
     for (topic, lanes) in &topics {
@@ -203,20 +196,22 @@ impl Lane<'_> {
             ];
             let own = [axis.x(holder.start()), axis.x(holder.end())];
             if wide <= place.w {
-                self.name(canvas, place.centre().x - wide / 2.0, ink::PAPER, name);
+                self.name(canvas, place.centre().x - wide / 2.0, true, name);
             } else if own[1] + wide <= ends[1] {
-                self.name(canvas, own[1], ink::TEXT, name);
+                self.name(canvas, own[1], false, name);
             } else if own[0] - wide >= ends[0] {
-                self.name(canvas, own[0] - wide, ink::TEXT, name);
+                self.name(canvas, own[0] - wide, false, name);
             } else {
                 let cut = canvas.cut(name, Type::Small, place.w - 2.0 * AROUND);
-                self.name(canvas, place.x, ink::PAPER, &cut);
+                self.name(canvas, place.x, true, &cut);
             }
         }
     }
 
-    fn name(&self, canvas: &mut PaperCanvas<'_>, x: f64, color: Color, name: &str) {
-        if color == ink::TEXT {
+    /// Writes a name from `x` on, inside a bar or beside it.
+    fn name(&self, canvas: &mut PaperCanvas<'_>, x: f64, is_inside: bool, name: &str) {
+        let color = if is_inside { ink::PAPER } else { ink::TEXT };
+        if !is_inside {
             // The hatching ends around words.
             let wide = canvas.width(name, Type::Small) + AROUND;
             let high = canvas.sizes.line();

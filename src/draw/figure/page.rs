@@ -193,10 +193,15 @@ pub(crate) fn fits(scene: &Scene) -> bool {
 
 /// A page of rows over time; `None` if too little is left for the time axis.
 fn lives_drawer(timeline: &Timeline, canvas: &PaperCanvas<'_>, width: f64) -> Option<Drawer> {
+    let drawer = drawer(timeline.clone(), canvas, width);
+    let axis = drawer.axis.right - drawer.axis.left;
+    (axis >= SHORTEST_AXIS).then_some(drawer)
+}
+
+/// A page of rows over time, below the heads of columns if there is no band of phases.
+pub(crate) fn drawer(timeline: Timeline, canvas: &PaperCanvas<'_>, width: f64) -> Drawer {
     let has_band = !timeline.phases.is_empty();
     let top = if has_band { 0.0 } else { canvas.sizes.line() };
     let place = Rect::new(0.0, top, width, 0.0);
-    let drawer = Drawer::new(timeline.clone(), Density::Paper, canvas, place);
-    let axis = drawer.axis.right - drawer.axis.left;
-    (axis >= SHORTEST_AXIS).then_some(drawer)
+    Drawer::new(timeline, Density::Paper, canvas, place)
 }

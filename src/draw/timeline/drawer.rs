@@ -231,6 +231,13 @@ impl Drawer {
         }
     }
 
+    /// The timeline without columns of rates and topics, its axis up to `right`.
+    pub(crate) fn without_columns(mut self, right: f64) -> Self {
+        self.axis.right = right;
+        (self.rates, self.beside) = (None, None);
+        self
+    }
+
     /// The y at which the rows begin.
     fn begin(&self) -> f64 {
         let has_band = !self.timeline.phases.is_empty();

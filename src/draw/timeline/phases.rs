@@ -10,7 +10,7 @@ use crate::mission::event_log::Phase;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PhaseLabel {
     pub(crate) span: Span,
-    /// Its names, the best first; the last is its number.
+    /// Its names, the best first, the shortest last.
     pub(crate) names: Vec<String>,
 }
 

@@ -73,8 +73,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
-// `use_sim_time`: a node that runs by simulated time subscribes to `/clock`.
-
+/// Reads `use_sim_time`: a node that runs by simulated time subscribes to `/clock`.
 pub(crate) fn read_parameters(context: &mut SourceContext<'_>, event: &ParameterEvent<'_>) {
     let set = event.set.iter().rev().find(|p| p.name == "use_sim_time");
     let Some(simulated) = set.and_then(|p| p.truth).filter(|_| !event.node.is_empty()) else {

@@ -576,8 +576,7 @@ impl Liveness {
         for life in Rc::make_mut(&mut self.lives) {
             if let Some(ended) = life.ended.as_mut().filter(|e| e.time == restart.death) {
                 let latest = restart.death.plus(period.max(SHUTDOWN_NS));
-                let is_proved = restart.is_proved;
-                ended.latest = if is_proved {
+                ended.latest = if restart.is_proved {
                     latest.min(restart.birth)
                 } else {
                     restart.birth
@@ -589,8 +588,7 @@ impl Liveness {
             }
             if let Some(began) = life.began.as_mut().filter(|b| b.time == restart.birth) {
                 let earliest = restart.birth.plus(-DISCOVERY_NS - period);
-                let is_proved = restart.is_proved;
-                began.earliest = if is_proved {
+                began.earliest = if restart.is_proved {
                     earliest.max(restart.death)
                 } else {
                     restart.death

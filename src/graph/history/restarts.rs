@@ -274,9 +274,10 @@ pub(crate) fn restarts(
         signs.extend(inferences.copied().flat_map(signs_of));
         signs.sort_unstable();
         let away = breaks.iter().filter_map(|(from, to)| {
-            let is_quick = to.since(*from) < GAP_NS;
-            let quick = Some((*from, *to)).filter(|_| is_quick);
-            quick.or_else(|| widest_gap(&signs, *from, *to))
+            if to.since(*from) < GAP_NS {
+                return Some((*from, *to));
+            }
+            widest_gap(&signs, *from, *to)
         });
         all.grown(node).extend(away.map(|(death, birth)| {
             let beats = own.iter().map(|own| own.beats(death, birth));

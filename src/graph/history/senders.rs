@@ -359,12 +359,13 @@ fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
 /// The quartiles of the sums of so many intervals, and the usual sum: of intervals about as long as the median, and exactly the mean of
 /// all if each lasts for as many of these as were lost. 0 without intervals.
 fn quartiles(times: &[Stamp], many: usize) -> ([i64; 3], i64) {
-    let sums = times.iter().zip(times.iter().skip(many));
-    let mut sums: Vec<i64> = sums.map(|(a, b)| b.since(*a)).collect();
+    let ordered = times.iter().zip(times.iter().skip(many));
+    let ordered = ordered.map(|(a, b)| b.since(*a));
+    let mut sums: Vec<i64> = ordered.clone().collect();
     let many = sums.len();
-    let (Some(&first), Some(&last)) = (sums.first(), sums.last()) else {
+    if many == 0 {
         return ([0; 3], 0);
-    };
+    }
     let mut quartile = |part: usize| *sums.select_nth_unstable((many * part / 4).min(many - 1)).1;
     let quartiles = [quartile(1), quartile(2), quartile(3)];
     let median = quartiles[1];
@@ -375,12 +376,11 @@ fn quartiles(times: &[Stamp], many: usize) -> ([i64; 3], i64) {
     let usual = mean(near.fold((0, 0), |all, sum| (all.0.saturating_add(*sum), all.1 + 1))).max(1);
     let lasts = |sum: i64| sum.saturating_add(usual / 2) / usual;
     // The first and the last may belong to the rates before and after.
-    let ends = i64::from(many > FEWEST_INTERVALS);
-    let inner = sums.iter().fold((0_i64, 0), |all, sum| {
-        (all.0.saturating_add(*sum), all.1 + lasts(*sum))
-    });
-    let outer = (first.saturating_add(last), lasts(first) + lasts(last));
-    let exact = mean((inner.0 - ends * outer.0, inner.1 - ends * outer.1));
+    let ends = usize::from(many > FEWEST_INTERVALS);
+    let inner = ordered.skip(ends).take(many - 2 * ends);
+    let exact = mean(inner.fold((0_i64, 0), |all, sum| {
+        (all.0.saturating_add(sum), all.1 + lasts(sum))
+    }));
     (quartiles, exact)
 }
 

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use crate::base::rhythm::{
-    CLOSE_NS, FEWEST_OF_RATE, GAP, GAP_NS, RATE_HOLDS_NS, SAME_STEP, SPEED_FEWEST, SPEED_HOLDS_NS,
-    SPEED_NS, SPEED_SHARE, TOGETHER_NS,
+    CLOSE_NS, GAP, GAP_NS, SAME_STEP, SPEED_FEWEST, SPEED_HOLDS_NS, SPEED_NS, SPEED_SHARE,
+    TOGETHER_NS,
 };
 use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::Recorded;
@@ -200,15 +200,12 @@ struct RateStep {
 fn speeds_of_rates(traffic: &Traffic) -> Vec<(Span, f64)> {
     let senders = traffic.iter().flatten().flat_map(|of| &of.list);
     let senders: Vec<_> = senders.filter(|s| !s.latched).collect();
-    let is_steady = |s: &&Stretch| {
-        s.is_even && s.count >= FEWEST_OF_RATE && s.last.since(s.first) >= RATE_HOLDS_NS
-    };
     let mut steps: Vec<RateStep> = Vec::new();
     for (sender, pair) in senders
         .iter()
         .flat_map(|s| s.stretches.windows(2).map(move |pair| (s, pair)))
     {
-        if pair[1].is_joined && pair.iter().all(|s| is_steady(&s)) {
+        if pair[1].is_joined && pair.iter().all(Stretch::has_rate) {
             steps.push(RateStep {
                 at: pair[1].first,
                 factor: pair[1].hz() / pair[0].hz(),

@@ -40,12 +40,9 @@ pub(crate) fn fold(
         load[at + 1] += leaves;
         folded[source] = at;
     }
-    let first = |folded: &[usize], v: usize| {
-        let before = graph.before[v].iter().map(|&u| folded[u] + 1);
-        before.max().unwrap_or(0)
-    };
     for &v in graph.order.iter().filter(|&&v| !graph.is_source(v)) {
-        folded[v] = first(&folded, v);
+        let before = graph.before[v].iter().map(|&u| folded[u] + 1);
+        folded[v] = before.max().unwrap_or(0);
     }
     // The leaves of a hub stand in several layers, as full as the others.
     let most = rank.len().div_ceil(layers - 1).max(FEWEST_IN_LAYER);

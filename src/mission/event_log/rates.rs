@@ -5,7 +5,7 @@
 
 use super::drafts::{Drafts, LogInput};
 use super::{Detail, Kind};
-use crate::base::rhythm::{ABOUT_NONE, FEWEST_OF_RATE, RATE_HOLDS_NS, RATE_PAUSE_NS};
+use crate::base::rhythm::{ABOUT_NONE, RATE_PAUSE_NS};
 use crate::graph::Element;
 use crate::graph::history::{Bound, Sender, Stretch, hide, strays};
 
@@ -16,13 +16,15 @@ const EXACT: f64 = 0.01;
 pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     let senders = context.history.sending.senders.iter();
     for sender in senders.filter(|v| !v.is_latched && !context.is_by_the_way(v.topic)) {
+        let first = strays(&sender.stretches);
         for (pair, end) in sender.stretches.windows(2).zip(1..) {
             let (before, after) = (&pair[0], &pair[1]);
             let gap = (before.last, Some(after.first));
-            let is_first = end == strays(&sender.stretches) && !hide(&context.history.pauses, gap);
+            let is_first = end == first && !hide(&context.history.pauses, gap);
             let none = is_first.then(|| about_none(&sender.stretches[..end], after));
+            let none = none.flatten();
             let is_change = changes(before, after, context.rate_change);
-            let from_hz = none.flatten().or_else(|| is_change.then(|| before.hz()));
+            let from_hz = none.or_else(|| is_change.then(|| before.hz()));
             let Some(from_hz) = from_hz.filter(|_| !is_away(context, sender, before, after)) else {
                 continue;
             };
@@ -31,7 +33,7 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
                 continue;
             }
             // Stray messages are not uncertain: the rate begins with its first message.
-            let last = none.flatten().map_or(before.last, |_| after.first);
+            let last = none.map_or(before.last, |_| after.first);
             let at = Bound {
                 time: after.first,
                 earliest: last.min(after.first.plus(-before.period)),
@@ -52,13 +54,8 @@ fn about_none(strays: &[Stretch], after: &Stretch) -> Option<f64> {
     let count: u64 = strays.iter().map(|s| s.count).sum();
     let (first, last) = (strays.first()?.first, strays.last()?.last);
     let hz = count as f64 * 1e9 / after.first.since(first).max(1) as f64;
-    let begins = holds(after) && hz * ABOUT_NONE < after.hz();
+    let begins = after.has_rate() && hz * ABOUT_NONE < after.hz();
     (begins && after.first.since(last) > RATE_PAUSE_NS).then_some(hz)
-}
-
-/// Whether a rate is steady for long enough.
-fn holds(s: &Stretch) -> bool {
-    s.is_even && s.count >= FEWEST_OF_RATE && s.last.since(s.first) >= RATE_HOLDS_NS
 }
 
 /// Whether a steady rate changes to another one.
@@ -66,7 +63,7 @@ fn changes(before: &Stretch, after: &Stretch, share: f64) -> bool {
     let step = (after.hz() - before.hz()).abs() / before.hz().min(after.hz());
     let differs = step > share + EXACT;
     let meets = after.is_joined || after.first.since(before.last) <= RATE_PAUSE_NS;
-    holds(before) && holds(after) && differs && meets
+    before.has_rate() && after.has_rate() && differs && meets
 }
 
 /// Whether the sender restarted between the two.
