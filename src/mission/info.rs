@@ -225,6 +225,11 @@ pub fn info(mission: &Mission) -> Info {
     let rates = Rates::new(mission);
     let topics = topics(mission, &rates);
     let traffic = traffic(mission, &topics);
+    let senders = |of: &[TopicId]| {
+        of.iter()
+            .flat_map(|id| rates.of_topic(*id))
+            .collect::<Vec<_>>()
+    };
     let named = elements.nodes.with_ids();
     let named = named.filter(|(_, node)| !is_unnamed(node.seen.evidence));
     let nodes = named.map(|(id, node)| {
@@ -241,7 +246,10 @@ pub fn info(mission: &Mission) -> Info {
             sent: own.sent,
             sent_hz: rates.while_sending(&own.sending),
             received: own.received,
-            received_hz: rates.while_sending(&own.receiving),
+            received_hz: match own.receiving[..] {
+                [topic] => topics[topic].hz,
+                _ => rates.while_sending(&senders(&own.receiving)),
+            },
         }
     });
     let mut info = Info {
@@ -325,7 +333,7 @@ struct NodeTraffic<'a> {
     sending: Vec<&'a Sender>,
     /// The number of messages received; `None` for a node without subscriptions.
     received: Option<u64>,
-    receiving: Vec<&'a Sender>,
+    receiving: Vec<TopicId>,
 }
 
 /// The traffic of every node, computed in one pass over the edges.
@@ -342,8 +350,7 @@ fn traffic<'a>(
         let own = &mut traffic[edge.node];
         own.subscribes += 1;
         *own.received.get_or_insert(0) += topics[edge.topic].count;
-        let of = mission.sending.of_topic(edge.topic).iter();
-        own.receiving.extend(of.filter(|sender| !sender.is_latched));
+        own.receiving.push(edge.topic);
     }
     let senders = mission.sending.senders.iter();
     for sender in senders.filter(|sender| !sender.is_latched) {

@@ -391,11 +391,8 @@ impl Fitting<'_> {
 /// The first part of a name that has more than one: `/robot1` of `/robot1/nav/planner`; in a namespace that is common to
 /// all names, the first part below it.
 fn outermost<'n>(name: &'n str, common: &str) -> Option<&'n str> {
-    let start = if lies_in(name, common) {
-        common.len() + 1
-    } else {
-        1
-    };
+    let around = Some(common).filter(|space| lies_in(name, space));
+    let start = around.map_or(0, str::len) + 1;
     let end = name.get(start..)?.find('/')? + start;
     name.get(..end)
 }
@@ -406,11 +403,9 @@ fn common_space<'n>(names: &[&'n str]) -> &'n str {
     for space in names.iter().filter_map(|name| outermost(name, "")) {
         *spaces.entry(space).or_default() += 1;
     }
-    let mut spaces = spaces.into_iter();
     let most = names.len() * COMMON.0 / COMMON.1;
-    spaces
-        .find(|(_, many)| *many > most)
-        .map_or("", |(space, _)| space)
+    let common = spaces.into_iter().find(|(_, many)| *many > most);
+    common.map_or("", |(space, _)| space)
 }
 
 /// The layouts by one engine so far: collapsing or opening a namespace inside a collapsed one changes nothing.

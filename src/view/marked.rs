@@ -86,11 +86,6 @@ impl WindowMarks {
         changed
     }
 
-    /// The parts of a headline.
-    fn parts_of(&self, headline: EventId) -> impl Iterator<Item = EventId> {
-        self.parts.get(&headline).into_iter().flatten().copied()
-    }
-
     fn report(&mut self, viewed: &Viewed<'_>, event: &Event, headline: EventId, part: Part) {
         let sign = Report {
             event,
@@ -295,9 +290,10 @@ impl WindowChanges {
         }
         let id = ArrowId(shown.id);
         // The number on a line is that of the event, also of one that is a consequence.
+        let parts = |id: &EventId| self.marks.parts.get(id).into_iter().flatten();
         let own = shown.events.iter();
-        let own = own.flat_map(|id| [*id].into_iter().chain(self.marks.parts_of(*id)));
-        let events: Vec<&Event> = own.filter_map(|id| now.event(id)).collect();
+        let own = own.flat_map(|id| std::iter::once(id).chain(parts(id)));
+        let events: Vec<&Event> = own.filter_map(|id| now.event(*id)).collect();
         for row in &mut shown.topics {
             let has = |items: &LivingItems| items.has_topic(now.viewed, id, row.topic);
             let there = (has(&self.before), has(&self.after));
