@@ -6,7 +6,6 @@
 //! A graph contains numbers only; names are stored once, in the [`Elements`] of the whole mission, sorted, so that an index
 //! is an order and equal graphs are equal bytes.
 
-pub mod diff;
 mod elements;
 mod graphs;
 pub(crate) mod history;

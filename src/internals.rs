@@ -17,8 +17,7 @@ pub mod evidence {
 /// See `src/graph.rs`.
 pub mod graph {
     pub use crate::graph::{
-        Built, Element, ElementState, Elements, Graph, Measures, PerElement, State, build, diff,
-        window,
+        Built, Element, ElementState, Elements, Graph, Measures, PerElement, State, build, window,
     };
 }
 

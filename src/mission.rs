@@ -24,7 +24,7 @@ use crate::base::geometry::Rect;
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::observation::LoggedText;
-use crate::graph::history::Sending;
+use crate::graph::history::{Record, Sending, windows};
 use crate::graph::{ById, Element, Elements, Graph, Graphs, TopicId};
 
 pub(crate) use event_log::EventId;
@@ -144,26 +144,24 @@ impl Mission {
         }
     }
 
-    /// Determines the changes from each window to the next, and derives lifetimes, sending and log from them: for
-    /// missions with known windows only. A rate must change by more than the fraction `threshold`, ≥ 0.
+    /// Derives lifetimes, messages, events and changes from the windows of a mission of which nothing else is known. A rate must
+    /// change by more than the fraction `threshold`, ≥ 0.
     pub fn find_changes(&mut self, threshold: f64) {
-        let mut finder = changes::Changes::new(&self.elements, threshold);
-        for (window, graph) in self.windows.iter_mut().zip(&self.graphs) {
-            window.changes = finder.next(window.span, &graph);
-        }
-        let all = self.elements.all();
-        for (what, seen) in all.zip(self.elements.seen_mut()) {
-            let rows = self.graphs.rows(what);
-            let windows = rows.filter_map(|(at, _)| Some(self.windows.get(at)?.span));
-            let lives = Span::joined(windows.collect(), 0);
+        let history = windows::history(&self.elements, &self.graphs);
+        let lives = self.elements.all().map(|what| history.records.of(what));
+        let lives: Vec<_> = lives
+            .map(|record| record.into_iter().flat_map(Record::spans).collect())
+            .collect();
+        for (seen, lives) in self.elements.seen_mut().zip(lives) {
             seen.lives = lives;
         }
-        self.sending = Sending::of_windows(&self.elements, &self.graphs);
-        let (log, events) = changes::logged(&self.elements, &self.windows);
-        self.log = log;
-        for (window, events) in self.windows.iter_mut().zip(events) {
-            window.events = events;
-        }
+        self.log.events = event_log::make(&event_log::LogInput {
+            elements: &self.elements,
+            history: &history,
+            rate_change: threshold,
+        });
+        self.sending = history.sending;
+        self.explain();
     }
 
     /// Whether exact lifetimes are known, not only windows.

@@ -1,76 +1,14 @@
 //! Property tests of graphs and missions.
 
-use bagreel::internals::evidence::Confidence;
-use bagreel::internals::graph::diff::{Diff, diff};
-use bagreel::internals::graph::{ElementState, Graph, State};
+use bagreel::internals::graph::Graph;
 use std::collections::BTreeSet;
 
-use bagreel::values::{EdgeId, Element, Kind, Length, NodeId, Period, TopicId};
+use bagreel::values::{Element, Kind, Length, Period};
 use bagreel::{Mission, Reading, read};
-use proptest::collection::btree_map;
 use proptest::prelude::*;
 
 use crate::support::Recording;
 use crate::support::rosbag1::{self, Pack};
-
-/// The graph that a difference from `before` describes.
-pub(crate) fn apply(before: &Graph, diff: &Diff) -> Graph {
-    let changed = diff.changed.iter().map(|(before, _)| before.what);
-    let gone: BTreeSet<Element> = diff.removed.iter().copied().chain(changed).collect();
-    let kept = before.states.iter().filter(|s| !gone.contains(&s.what));
-    let fresh = diff.changed.iter().map(|(_, after)| after);
-    let mut states: Vec<_> = kept.chain(&diff.added).chain(fresh).cloned().collect();
-    states.sort_by_key(|state| state.what);
-    Graph { states }
-}
-
-fn state() -> impl Strategy<Value = State> {
-    prop::sample::select(State::ALL.to_vec())
-}
-
-fn confidence() -> impl Strategy<Value = Confidence> {
-    prop::sample::select(Confidence::ALL.to_vec())
-}
-
-/// The states of some of `many` elements of a kind.
-fn some(kind: fn(u32) -> Element, many: u32) -> impl Strategy<Value = Vec<ElementState>> {
-    let one = (state(), confidence(), prop::option::of(0..500_u64));
-    btree_map(0..many, one, 0..20).prop_map(move |all| {
-        let all = all.into_iter();
-        let made = all.map(|(id, (state, confidence, count))| ElementState {
-            count,
-            hz: count.map(|n| n as f64 / 10.0),
-            ..ElementState::new(kind(id), state, confidence)
-        });
-        made.collect()
-    })
-}
-
-fn graph() -> impl Strategy<Value = Graph> {
-    let kinds = [
-        some(|id| Element::Node(NodeId(id)), 30),
-        some(|id| Element::Topic(TopicId(id)), 30),
-        some(|id| Element::Publish(EdgeId(id)), 40),
-        some(|id| Element::Subscribe(EdgeId(id)), 40),
-    ];
-    kinds.prop_map(|states| Graph {
-        states: states.concat(),
-    })
-}
-
-proptest! {
-    #[test]
-    fn a_graph_has_no_difference_from_itself(graph in graph()) {
-        prop_assert!(diff(&graph, &graph) == Diff::default());
-    }
-
-    #[test]
-    fn a_diff_turns_one_graph_into_the_other(before in graph(), after in graph()) {
-        let diff = diff(&before, &after);
-        prop_assert_eq!(diff == Diff::default(), before == after);
-        prop_assert_eq!(apply(&before, &diff), after);
-    }
-}
 
 /// Some nodes, each of which publishes on a topic for some time and may return.
 pub(crate) fn recording() -> impl Strategy<Value = Recording> {

@@ -14,6 +14,7 @@ pub(crate) mod records;
 mod restarts;
 pub(crate) mod senders;
 pub(crate) mod simulation;
+pub(crate) mod windows;
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -21,10 +22,10 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::{ById, Element, Elements, Graphs, NodeId, State, TopicId};
+use super::{ById, NodeId, TopicId};
 use crate::base::rhythm::{
-    ALIKE, FEWEST, FEWEST_OF_RATE, GONE_NS, LONGER, OFTEN, RATE_HOLDS_NS, SAME_RATE, STEADY,
-    STEADY_NS, broken_after,
+    ALIKE, FEWEST, FEWEST_OF_RATE, GONE_NS, LONGER, OFTEN, RATE_HOLDS_NS, STEADY, STEADY_NS,
+    broken_after,
 };
 use crate::base::time::{Span, Stamp};
 
@@ -187,78 +188,6 @@ impl Sending {
         let at = of.binary_search_by_key(&Some(node), |s| s.node).ok()?;
         of.get(at)
     }
-
-    /// The messages of a mission with known windows only: in each window with messages, a stretch of its
-    /// rate.
-    pub(crate) fn of_windows(elements: &Elements, graphs: &Graphs) -> Self {
-        let publishers = elements.wiring(|_, _| true).publishers;
-        let mut senders = Vec::new();
-        for topic in elements.topics.ids() {
-            let mut rest = vec![0; graphs.len()];
-            for (at, row) in graphs.rows(Element::Topic(topic)) {
-                rest[at] = row.count.unwrap_or(0);
-            }
-            let mut own = Vec::new();
-            for node in &publishers[topic] {
-                let Some(edge) = elements.published((*node, topic)) else {
-                    continue;
-                };
-                let mut counts = vec![0; graphs.len()];
-                let mut is_latched = false;
-                for (at, row) in graphs.rows(edge) {
-                    is_latched |= row.state == State::Latched;
-                    counts[at] = row.count.unwrap_or(0);
-                    rest[at] = rest[at].saturating_sub(counts[at]);
-                }
-                own.push((Some(*node), is_latched, counts));
-            }
-            let all = std::iter::once((None, false, rest)).chain(own);
-            senders.extend(all.filter_map(|(node, is_latched, counts)| {
-                let stretches = stretches_of_windows(&counts, graphs.spans());
-                (!stretches.is_empty()).then_some(Sender {
-                    topic,
-                    node,
-                    is_latched,
-                    stretches,
-                })
-            }));
-        }
-        Self {
-            senders,
-            pauses: ById::default(),
-        }
-    }
-}
-
-/// The stretches of a sender by the number of its messages in each window: consecutive windows with about the
-/// same rate are one.
-fn stretches_of_windows(counts: &[u64], spans: &[Span]) -> Vec<Stretch> {
-    let mut all: Vec<Stretch> = Vec::new();
-    let mut before = 0;
-    for (at, (count, span)) in counts.iter().zip(spans).enumerate() {
-        let next = spans.get(at + 1).map_or(span.end, |next| next.start);
-        let last = span.end.min(next).max(span.start.plus(1)).plus(-1);
-        let period = span.nanos() / i64::try_from(*count).unwrap_or(i64::MAX).max(1);
-        let ratio = |s: &Stretch| s.period.max(1) as f64 / period.max(1) as f64;
-        let is_same = |s: &Stretch| (1.0 / SAME_RATE..=SAME_RATE).contains(&ratio(s));
-        match all.last_mut() {
-            _ if *count == 0 => {}
-            Some(stretch) if before > 0 && is_same(stretch) => {
-                stretch.count = stretch.count.saturating_add(*count);
-                stretch.last = last;
-            }
-            _ => all.push(Stretch {
-                first: span.start,
-                last,
-                count: *count,
-                period,
-                is_even: true,
-                is_joined: before > 0,
-            }),
-        }
-        before = *count;
-    }
-    all
 }
 
 /// Whether a sender begins with a rhythm, so that there were no messages before: even messages, or many

@@ -26,7 +26,7 @@ use crate::base::words::worded;
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::{ById, Element, NodeId};
 
-pub(crate) use drafts::{LogInput, sorted, sorted_by};
+pub(crate) use drafts::{LogInput, sorted};
 pub(crate) use sentence::{interrupted, predicate, sentence, sentence_with};
 pub use written::{LogFormat, LogLine, LogOptions, log};
 pub(crate) use written::{LogRow, body, headlines, lines, quoted, row_lines, whole};
@@ -44,7 +44,7 @@ pub(crate) fn make(context: &LogInput<'_>) -> ById<EventId, Event> {
     incidents::add_lifecycles(context, &mut drafts);
     incidents::add(context, &mut drafts);
     causes::add(context, &mut drafts);
-    sorted(drafts.list, context.elements).0
+    sorted(drafts.list, context.elements)
 }
 
 ids! {

@@ -22,8 +22,8 @@ use crate::evidence::EvidenceLine;
 use crate::evidence::code::{self, SourceCode};
 use crate::evidence::collector::{self, Recorded};
 use crate::evidence::conclude::{self, Findings, conclude};
-use crate::graph::history::Sending;
 use crate::graph::history::simulation::ClockChange;
+use crate::graph::history::windows;
 use crate::graph::window::{self, Cut, Division, Length, Windows};
 use crate::graph::{History, NodeId, Windowed, graphs, made, traffic, unread};
 use crate::mission::RATE_CHANGE;
@@ -244,7 +244,7 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
         return Err(Error::usage(what, "give the bag itself"));
     }
     if mission.sending.senders.is_empty() {
-        mission.sending = Sending::of_windows(&mission.elements, &mission.graphs);
+        mission.sending = windows::sending(&mission.elements, &mission.graphs);
     }
     let basis = Basis {
         elements: &mission.elements,

@@ -438,7 +438,7 @@ mod tests {
     fn names_have_the_fewest_parts_that_identify_them() {
         let frame = last(&["/a", "/a /cam/driver>/cam/image /cam/driver>/cam/info"]);
         assert_eq!(frame.words(usize::MAX), "+ driver starts");
-        assert_eq!(frame.note, "0:01");
+        assert_eq!(frame.note, "0:10");
         assert_eq!(
             caption(&["/a /arm/driver", "/a /cam/driver"]),
             "− arm/driver stops; + cam/driver starts"
@@ -484,7 +484,7 @@ mod tests {
     #[test]
     fn names_are_shortened_until_the_headline_fits() {
         let name = "x".repeat(10_000);
-        let now = format!("/{name} /b /c /d =/e =/h@5 =/i@5 =/j@5 =/k@5 =/l@5");
+        let now = format!("/{name} /b /c /d =/e =/h@4 =/i@5 =/j@7 =/k@9 =/l@12");
         let frame = last(&["/m =/h@1 =/i@1 =/j@1 =/k@1 =/l@1", &now]);
         let named: usize = frame.caption.iter().map(|p| p.names.len()).sum();
         assert_eq!((named, frame.counts.total()), (11, 11));
@@ -493,7 +493,7 @@ mod tests {
             frame.words(3),
             "− m stops; + b, c, d, +1 start; + e appears; +5"
         );
-        assert!(joined(&frame.fitting(|_| true)).contains("k 1 → 5 Hz"));
+        assert!(joined(&frame.fitting(|_| true)).contains("k 1 → 9 Hz"));
         let fitting = |most| joined(&frame.fitting(|words| joined(words).chars().count() < most));
         let short = fitting(40);
         assert_eq!(short, "− m stops; + b, c, d, +1 start; +6");

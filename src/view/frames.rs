@@ -637,12 +637,12 @@ mod tests {
 
     #[test]
     fn the_first_window_is_the_base_and_ghosts_stay_for_one_window() {
-        let windows = ["/a>/t /b</t", "/a>/t", "/a>/t", "/a>/t /b</t"];
+        let windows = ["/a>/t /b</t", "/a>/t", "/a>/t", "/a>/t /c</t"];
         let want = [
             "/a /b /t /a>/t /t>/b",
             "/a -/b /t /a>/t -/t>/b",
             "/a /t /a>/t",
-            "/a +/b /t /a>/t +/t>/b",
+            "/a +/c /t /a>/t +/t>/c",
         ];
         assert_eq!(seen(&windows, &ViewOptions::default()), want);
     }
@@ -716,18 +716,12 @@ mod tests {
 
     #[test]
     fn a_group_has_the_rate_of_its_members() {
-        let go = |feedback: u32| {
-            let rest = ["goal", "cancel", "result"].map(|t| format!("/a>/go/{t}@0"));
-            format!(
-                "/a>/go/status@10 /a>/go/feedback@{feedback} {}",
-                rest.join(" ")
-            )
-        };
-        let windows = [go(10), go(14), go(40)];
+        let camera = |hz: u32| format!("/a>/image@10 /a>/image/theora@0 /a>/image/compressed@{hz}");
+        let windows = [camera(10), camera(14), camera(40)];
         let windows: Vec<&str> = windows.iter().map(String::as_str).collect();
         let got = seen(&windows, &ViewOptions::default());
-        assert_eq!(got[1], "/a ^/go/action_topics ^/a>/go/action_topics");
-        assert_eq!(got[2], "/a ^/go/action_topics ^/a>/go/action_topics");
+        assert_eq!(got[1], "/a ^/image/image_topics ^/a>/image/image_topics");
+        assert_eq!(got[2], "/a ^/image/image_topics ^/a>/image/image_topics");
         let (view, _) = view(&mission(&windows), &ViewOptions::default());
         assert_eq!(view.frames[2].counts.rates, 1);
     }

@@ -327,7 +327,7 @@ mod tests {
         assert_eq!((all.items.len(), all.arrows.len()), (3, 1));
         assert_eq!(
             (all.arrows[0].hz, all.arrows[0].count),
-            (Some(3.0), Some(9))
+            (Some(3.0), Some(90))
         );
         assert!(all.items.iter().all(|s| s.mark.is_none()));
         assert!(union(&View::default()).is_none());

@@ -10,10 +10,11 @@ use crate::graph::{
 };
 use crate::mission::{Mission, Window};
 
-const SECOND: i64 = 1_000_000_000;
+/// The length of a window.
+const LENGTH: i64 = 10_000_000_000;
 
 /// A mission with a window per text. `/a>/t` is a publication and `/b</t` a subscription, `/a` alone a node, `=/t`
-/// a topic; `@15` after one of them is its rate (of the topic too, for a publication), `~` makes it silent. Windows last a second.
+/// a topic; `@15` after one of them is its rate (of the topic too, for a publication), `~` makes it silent. Windows last ten seconds.
 pub(crate) fn mission(windows: &[&str]) -> Mission {
     let parsed: Vec<Vec<Word>> = windows
         .iter()
@@ -32,7 +33,7 @@ pub(crate) fn mission(windows: &[&str]) -> Mission {
         events: Vec::new(),
     });
     let windows: Vec<Window> = windows.collect();
-    let period = Period::from_nanos(SECOND).unwrap();
+    let period = Period::from_nanos(LENGTH).unwrap();
     let mut mission = Mission {
         undrawn: Vec::new(),
         logged: Vec::new(),
@@ -54,8 +55,8 @@ pub(crate) fn mission(windows: &[&str]) -> Mission {
 }
 
 fn span(index: usize) -> Span {
-    let start = i64::try_from(index).unwrap() * SECOND;
-    Span::new(Stamp(start), Stamp(start + SECOND))
+    let start = i64::try_from(index).unwrap() * LENGTH;
+    Span::new(Stamp(start), Stamp(start + LENGTH))
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -186,14 +187,14 @@ fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
     }
 }
 
-/// The number of messages in a window of one second.
+/// The number of messages in a window.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "small rates of tests"
 )]
 fn count(hz: Option<f64>) -> Option<u64> {
-    hz.map(|hz| hz.round() as u64)
+    hz.map(|hz| (hz * LENGTH as f64 / 1e9).round() as u64)
 }
 
 /// Each window of a mission as the text that [`mission`] reads, without rates.

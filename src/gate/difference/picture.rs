@@ -164,7 +164,7 @@ pub(crate) fn union(
         period,
         step: period,
         log: EventLog {
-            events: sorted(events.all(), &elements).0,
+            events: sorted(events.all(), &elements),
             compares: true,
             ..EventLog::default()
         },

@@ -90,6 +90,17 @@ impl Record {
         }
     }
 
+    /// The record of an element of which nothing but its lifetimes is known.
+    pub(super) fn of_lives(confidence: Confidence, lives: Vec<Life>) -> Self {
+        Self {
+            confidence,
+            lives,
+            fixed: None,
+            needs_messages: false,
+            silences: Vec::new(),
+        }
+    }
+
     /// The times at which it was silent although it existed; `None` for a silence to the end.
     pub(crate) fn silences(&self) -> &[Silence] {
         &self.silences

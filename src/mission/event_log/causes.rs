@@ -50,11 +50,21 @@ fn limit(event: &Event) -> Option<(NodeId, Kind)> {
     }
 }
 
-/// A node that is known only from one topic's messages need not have stopped or started, and falls silent, when another node
-/// takes that topic over: if `/joystick` is known from `/cmd_vel` alone and `/nav` takes it over, `/joystick` is still there.
+/// The publications of a topic that another node takes over end and begin with that. A node that is known only from one topic's
+/// messages need not have stopped or started, and falls silent: if `/joystick` is known from `/cmd_vel` alone and `/nav` takes it
+/// over, `/joystick` is still there.
 fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
-    let limits = headlines(drafts, &[Kind::Started, Kind::Stopped, Kind::Silent]);
-    let limits = by(drafts, limits, limit);
+    let limits = headlines(
+        drafts,
+        &[
+            Kind::Started,
+            Kind::Stopped,
+            Kind::Silent,
+            Kind::Appeared,
+            Kind::Vanished,
+        ],
+    );
+    let limits = by(drafts, limits, |event| Some((event.what, event.kind)));
     let steps = by(drafts, headlines(drafts, &[Kind::Rate]), |event| {
         let (node, topic) = context.elements.ends(event.what);
         topic.filter(|_| node.is_some())
@@ -86,14 +96,18 @@ fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
         let ends = [
             (from, Kind::Stopped, event.earliest),
             (from, Kind::Silent, event.earliest),
+            (from, Kind::Vanished, event.earliest),
             (to, Kind::Started, event.time),
+            (to, Kind::Appeared, event.time),
         ];
         for (nodes, kind, at) in ends {
-            for node in nodes.iter().filter(|node| is_only_sender(**node, topic)) {
-                for id in limits.get(&(*node, kind)).into_iter().flatten() {
-                    if is_within(drafts.get(*id).time, at, TOGETHER_NS) {
-                        drafts.fold(*id, hand);
-                    }
+            let own = nodes.iter().filter_map(|node| match kind {
+                Kind::Vanished | Kind::Appeared => context.elements.published((*node, topic)),
+                _ => Some(Element::Node(*node)).filter(|_| is_only_sender(*node, topic)),
+            });
+            for id in own.filter_map(|what| limits.get(&(what, kind))).flatten() {
+                if is_within(drafts.get(*id).time, at, TOGETHER_NS) {
+                    drafts.fold(*id, hand);
                 }
             }
         }

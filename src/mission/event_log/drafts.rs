@@ -63,18 +63,8 @@ impl Drafts {
 }
 
 /// Sorts by time, kind and name, and updates the references of parts and the weights of wholes.
-pub(crate) fn sorted(list: ById<EventId, Event>, elements: &Elements) -> SortedEvents {
-    sorted_by(list, |event| (elements.ends(event.what), event.what))
-}
-
-/// Events in order, and the new id of each by the old one.
-pub(crate) type SortedEvents = (ById<EventId, Event>, ById<EventId, EventId>);
-
-/// As [`sorted`], with the order of events of one time and kind.
-pub(crate) fn sorted_by<K: Ord>(
-    mut list: ById<EventId, Event>,
-    key: impl Fn(&Event) -> K,
-) -> SortedEvents {
+pub(crate) fn sorted(mut list: ById<EventId, Event>, elements: &Elements) -> ById<EventId, Event> {
+    let key = |event: &Event| (elements.ends(event.what), event.what);
     let mut order: Vec<EventId> = list.ids().collect();
     order.sort_by_key(|at| (list[*at].time, list[*at].kind, key(&list[*at])));
     let mut new = ById::like(&list, EventId::default());
@@ -92,8 +82,7 @@ pub(crate) fn sorted_by<K: Ord>(
         event.weight = weight;
     }
     let mut list: ById<EventId, Option<Event>> = list.into_iter().map(Some).collect();
-    let list = order.iter().filter_map(|at| list[*at].take()).collect();
-    (list, new)
+    order.iter().filter_map(|at| list[*at].take()).collect()
 }
 
 impl Event {

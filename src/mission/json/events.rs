@@ -136,7 +136,7 @@ pub(crate) fn events_of(
             list.get_mut(*part)?.part_of = Some(id);
         }
     }
-    Some(sorted(list, elements).0)
+    Some(sorted(list, elements))
 }
 
 impl EventJson<'_> {

@@ -401,7 +401,8 @@ mod tests {
                 is_picture: true,
                 ..ViewOptions::default()
             };
-            let windows = ["/a>/t /b</t", "/a>/t /b</t =/x@5"];
+            let later = "/a>/t /b</t =/x@5";
+            let windows = ["/a>/t /b</t", later, later];
             let (view, _) = view(&mission(&windows), &options);
             let words: Vec<&str> = view
                 .also
