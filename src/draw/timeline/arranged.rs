@@ -46,6 +46,8 @@ pub(crate) fn by_namespace(rows: Vec<Row>, whole: Span, is_folded: bool) -> Vec<
     let mut spaces: Vec<(String, Vec<Row>)> = spaces.into_iter().collect();
     let start = |own: &[Row]| own.iter().map(Row::start).min();
     spaces.sort_by_key(|(space, own)| (space != "/", start(own)));
+    // If all names are at the root, a title says nothing.
+    let is_flat = spaces.len() == 1 && spaces[0].0 == "/";
     let mut all = Vec::new();
     for (space, mut own) in spaces {
         if let [only] = &mut own[..] {
@@ -54,15 +56,19 @@ pub(crate) fn by_namespace(rows: Vec<Row>, whole: Span, is_folded: bool) -> Vec<
             continue;
         }
         for row in &mut own {
-            row.level = Level::Inside;
+            if !is_flat {
+                row.level = Level::Inside;
+            }
             row.labels = vec![last_part(&row.name).to_owned()];
         }
-        all.push(Row {
-            name: space.as_str().into(),
-            labels: vec![space],
-            level: Level::Title,
-            ..Row::default()
-        });
+        if !is_flat {
+            all.push(Row {
+                name: space.as_str().into(),
+                labels: vec![space],
+                level: Level::Title,
+                ..Row::default()
+            });
+        }
         let (fixed, open): (Vec<Row>, Vec<Row>) = own.into_iter().partition(&is_fixed);
         // If nothing else is shown, a few rows are more informative than their number.
         let is_all = fixed.len() == many && many <= MOST_OPEN;

@@ -14,18 +14,18 @@ use crate::draw::picture::title::SIDES;
 use crate::draw::timeline::Timeline;
 use crate::graph::Element;
 use crate::mission::EventId;
-use crate::mission::event_log::{Event, Kind, LogFormat, LogLine, LogRow, row_lines};
+use crate::mission::event_log::{Event, Kind, LogFormat, LogLine, LogRow, interrupted, row_lines};
 use crate::view::{Frame, Headline, OngoingEvent};
 
-/// The headlines of a window, and the elements that are back in it: its index, the number of headlines, the texts of the
-/// three badges, its lines, and the film's headline.
+/// The headlines of a window, the interruptions that begin in it, and the elements that are back in it: its index, the number of
+/// headlines, the texts of the three badges, its lines, and the film's headline.
 #[derive(Serialize)]
 pub(super) struct ChangedWindow(usize, usize, [String; 3], Vec<ChangeLine>, String);
 
 /// A change: its time in seconds, its sign (0 appeared, 1 vanished, 2 changed), its element (-1 for one that is not drawn),
-/// its sentence, its index in the log, and its time in words.
+/// its sentence, its index in the log unless it is an interruption, and its time in words.
 #[derive(Serialize)]
-struct ChangeLine(f64, u8, i64, String, EventId, String);
+struct ChangeLine(f64, u8, i64, String, Option<EventId>, String);
 
 /// The most headlines of one window that are listed; the rest is counted.
 const MOST_REPORTED: usize = 200;
@@ -96,7 +96,14 @@ impl PageChanges {
             let text = format!("{name} is back after {}", words::duration(away));
             let when = words::offset_tenths(mission.offset(end));
             let at = secs(frame, end);
-            Some(ChangeLine(at, 2, place(&last.what), text, last.event, when))
+            Some(ChangeLine(
+                at,
+                2,
+                place(&last.what),
+                text,
+                Some(last.event),
+                when,
+            ))
         };
         let line = |frame: &Frame, headline: &Headline| {
             let (event, line) = said.get(&headline.event)?;
@@ -113,8 +120,18 @@ impl PageChanges {
                 exact => exact.to_owned(),
             };
             let (at, place) = (secs(frame, event.time), place(&headline.what));
-            let (text, id) = (line.words.clone(), headline.event);
+            let (text, id) = (line.words.clone(), Some(headline.event));
             Some(ChangeLine(at, sign, place, text, id, when))
+        };
+        let interrupted = |frame: &Frame| {
+            let all = mission.log.interruptions.iter();
+            let inside = all.filter(|one| frame.span.contains(one.time));
+            let line = inside.map(|one| {
+                let when = words::offset_tenths(mission.offset(one.time));
+                let at = clock.secs(one.time);
+                ChangeLine(at, 2, -1, interrupted(one), None, when)
+            });
+            line.collect::<Vec<_>>()
         };
         let frames = view.frames.iter().enumerate();
         let frames = frames.filter(|(_, frame)| frame.is_changed());
@@ -127,17 +144,20 @@ impl PageChanges {
             }
             let headlines = frame.headlines.iter().take(MOST_REPORTED);
             let headlines = headlines.filter_map(|headline| line(frame, headline));
+            let lines = interrupted(frame).into_iter().chain(headlines);
             ChangedWindow(
                 at,
                 frame.counts.total(),
                 counts,
-                headlines.chain(returns).collect(),
+                lines.chain(returns).collect(),
                 visible(&frame.words(MOST_PHRASES)).into_owned(),
             )
         });
         let windows: Vec<ChangedWindow> = windows.collect();
         // The list has every mark: a part of an event is marked only if the event is listed.
-        let listed = windows.iter().flat_map(|w| w.3.iter().map(|line| line.4));
+        let listed = windows
+            .iter()
+            .flat_map(|w| w.3.iter().filter_map(|line| line.4));
         let listed: BTreeSet<EventId> = listed.collect();
         let whole = |id| mission.log.events.get(id).and_then(|event| event.part_of);
         let is_listed = |id: &EventId| view.compares || listed.contains(&whole(*id).unwrap_or(*id));
@@ -181,7 +201,11 @@ impl PageChanges {
             .attribute("id", "allchanges");
         for (window, ChangeLine(at, _, _, text, event, when)) in lines.into_iter().take(MOST_ROWS) {
             let when = if compares { SIDES[window.min(1)] } else { when };
-            xml.open("tr").attribute("data-entry", event).open("th");
+            xml.open("tr");
+            if let Some(event) = event {
+                xml.attribute("data-entry", event);
+            }
+            xml.open("th");
             xml.open("a").attribute("href", format_args!("#t={at}"));
             xml.text(when).close().close();
             xml.leaf("td", text).close().raw("\n");

@@ -40,16 +40,6 @@ fn by<K: Ord>(
     grouped(ids.filter_map(|id| Some((key(drafts.get(id))?, id))))
 }
 
-/// The node that an event is about, if that started, stopped or fell silent.
-fn limit(event: &Event) -> Option<(NodeId, Kind)> {
-    match (event.what, event.kind) {
-        (Element::Node(node), Kind::Started | Kind::Stopped | Kind::Silent) => {
-            Some((node, event.kind))
-        }
-        _ => None,
-    }
-}
-
 /// The publications of a topic that another node takes over end and begin with that. A node that is known only from one topic's
 /// messages need not have stopped or started, and falls silent: if `/joystick` is known from `/cmd_vel` alone and `/nav` takes it
 /// over, `/joystick` is still there.
@@ -117,7 +107,10 @@ fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
 /// Subscriptions that appear or vanish with the topic's publisher are consequences: `/viewer` subscribes to `/map` again when
 /// `/map_server` has restarted.
 fn subscribers(context: &LogInput<'_>, wiring: &Wiring, drafts: &mut Drafts) {
-    let limits = by(drafts, drafts.list.ids(), limit);
+    let limits = by(drafts, drafts.list.ids(), |event| match event.what {
+        Element::Node(node) => Some(node),
+        _ => None,
+    });
     for id in headlines(drafts, &[Kind::Appeared, Kind::Vanished]) {
         let event = drafts.get(id);
         let (Element::Subscribe(_), (_, Some(topic))) =
@@ -125,16 +118,18 @@ fn subscribers(context: &LogInput<'_>, wiring: &Wiring, drafts: &mut Drafts) {
         else {
             continue;
         };
-        let kind = match event.kind {
-            Kind::Appeared => Kind::Started,
-            _ => Kind::Stopped,
+        let is_cause = |cause: &Event| {
+            let at = match (event.kind, cause.kind) {
+                (Kind::Appeared, Kind::Restarted) => cause.until.unwrap_or(cause.time),
+                (Kind::Appeared, Kind::Started)
+                | (Kind::Vanished, Kind::Stopped | Kind::Restarted) => cause.time,
+                _ => return false,
+            };
+            is_within(at, event.time, TOGETHER_NS)
         };
         let senders = wiring.publishers[topic].iter();
-        let mut of = senders
-            .filter_map(|node| limits.get(&(*node, kind)))
-            .flatten();
-        let cause = of.find(|id| is_within(drafts.get(**id).time, event.time, TOGETHER_NS));
-        if let Some(cause) = cause.copied() {
+        let mut of = senders.filter_map(|node| limits.get(node)).flatten();
+        if let Some(cause) = of.find(|id| is_cause(drafts.get(**id))).copied() {
             drafts.fold(id, cause);
         }
     }

@@ -34,11 +34,11 @@ function listChanges() {
 		const lines = all.flatMap(([w]) => linesOf(w)), n = all.reduce((sum, [, n, , lines]) => sum + n - lines.length, lines.length);
 		fill('changes', lines, ([, sign, i, text, id, when]) => {
 			const line = entry(i, text, KINDS[sign], data.sides ? '' : when);
-			line.dataset.entry = id;
+			if (id != null) line.dataset.entry = id;
 			return line;
 		});
 		if (n > lines.length) $.changes.append(make('p', { textContent: `and ${n - lines.length} more` }));
-		if (!n) $.changes.append(make('p', { textContent: lastChange() }));
+		if (!n && !lines.length) $.changes.append(make('p', { textContent: lastChange() }));
 		return;
 	}
 	setText('changestitle', `Differences from window ${base + 1}`);
@@ -124,5 +124,7 @@ function listSpaces() {
 		save();
 	} }), ` ${space == '/' ? 'no namespace' : space} (${n})`)));
 }
-$.known.hidden = !isTopicTimeline || !whole.kinds.includes(0);
-onSeek.push(() => $.known.hidden || fill('knownlist', [...whole.kinds.keys()].filter(i => !whole.kinds[i] && !/ \?( ×\d+)?$/.test(whole.names[i])), element));
+// The nodes that are known beside topics; those without a name end with a question mark.
+const knownNodes = isTopicTimeline ? [...whole.kinds.keys()].filter(i => !whole.kinds[i] && !/ \?( ×\d+)?$/.test(whole.names[i])) : NONE;
+$.known.hidden = !knownNodes.length;
+onSeek.push(() => $.known.hidden || fill('knownlist', knownNodes, element));

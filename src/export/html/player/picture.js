@@ -113,7 +113,7 @@ function header() {
 	setText('phase', p < 0 ? '' : `phase ${p + 1}: ${phases[p][2]}`);
 	setText('headline', base < 0 && !range && !without.size && headlines.get(now)?.words || lastChange());
 	// The log events that the badges count; a difference between two arbitrary windows need not be an event.
-	if (base < 0 && !range) $.counts.dataset.entries = linesOf(now).map(line => line[4]).join(' ');
+	if (base < 0 && !range) $.counts.dataset.entries = linesOf(now).flatMap(line => line[4] ?? NONE).join(' ');
 	else delete $.counts.dataset.entries;
 	$.counts.dataset.of = range ? 'this range' : base < 0 ? data.sides ? '' : 'this window' : 'compared';
 	$.counts.replaceChildren(...counts.flatMap((text, m) => text ? [make('span', { className: KINDS[m], textContent: text })] : []));

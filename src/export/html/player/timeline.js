@@ -65,7 +65,7 @@ function drawTime() {
 	const small = !isTopicTimeline && ($.controls.classList.contains('small') || isPhone()), wide = $.axis.clientWidth, x = s => part(s) * wide;
 	// Rows without events are folded if not all have space, since those with events tell the mission.
 	const most = small ? 5 : isTopicTimeline ? 56 : 14, least = small ? 2 : isTopicTimeline ? 20 : 9;
-	const room = small ? 48 : isTopicTimeline ? $.controls.clientHeight - $.buttons.offsetHeight - 110 : innerHeight * .3;
+	const room = small ? 48 : isTopicTimeline ? $.controls.clientHeight - $.buttons.offsetHeight - 110 : innerHeight * (innerHeight < 800 ? .2 : .3);
 	const isTight = !isTopicTimeline && rows.some(([i], r) => i >= 0 && !quiet[r]) && rows.filter(([i]) => i < 0 || !isOut(whole, i)).length * (small ? 3 : least) > room;
 	let count = 0;
 	isFolded = isTight && (small || !showsAll);
