@@ -148,8 +148,12 @@ fn why_shows_the_last_errors_before_a_node_stopped() {
     let dir = tempfile::tempdir().unwrap();
     fs::write(dir.path().join("r.bag"), write(&bag, Pack::None, 20_000)).unwrap();
     let text = printed(dir.path(), "info r.bag --why /nav");
-    let answer = "  stopped at 00:29.9\n    00:28.0 WARN: no path\n    00:29.0 ERROR: giving up\n";
-    assert!(text.contains(answer), "{text}");
+    let (_, answer) = text.split_once("00:29.9  /nav stopped: publishes /plan").unwrap();
+    let answer: Vec<&str> = answer.lines().map(str::trim).take(3).collect();
+    let expected = ["", "00:28.0    WARN: no path", "00:29.0    ERROR: giving up"];
+    assert_eq!(answer, expected, "{text}");
+    let text = printed(dir.path(), "info r.bag --why /base");
+    assert!(!text.contains("stopped"), "{text}");
 }
 
 #[test]

@@ -21,10 +21,13 @@ DONE = (0, 3)
 
 
 def texts(paths: Paths) -> list[str]:
-    """One path, or several, as texts."""
+    """One path or text, or several, as texts."""
     if isinstance(paths, (str, os.PathLike)):
         paths = [paths]
-    return [os.fspath(path) for path in paths]
+    try:
+        return [os.fspath(path) for path in paths]
+    except TypeError:
+        raise TypeError(f"{paths!r} is no path or text, and no list of these") from None
 
 
 def given(values: Mapping[str, Any], *others: str) -> dict[str, Any]:
