@@ -34,8 +34,7 @@ pub(super) struct DiffArgs {
     /// Also write this file: `.txt`, `.json`, `.md`, or a picture of both in any format of `render`. Repeatable.
     #[arg(long = "output", short, value_name = "FILE")]
     outputs: Vec<OsString>,
-    /// Report rates that differ by more than this fraction, if statistically significant. [default: 0.25, and what `check` finds
-    /// with a baseline of A]
+    /// Report rates that differ by more than this fraction, if statistically significant. [default: what `baseline` allows]
     #[arg(long, value_name = "SHARE", value_parser = share)]
     rate_change: Option<f64>,
     #[command(flatten)]

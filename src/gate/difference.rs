@@ -8,17 +8,17 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::baseline::{self, SHARE};
-use super::facts::{Facts, Rate, Role, TopicIn};
+use super::facts::{Facts, Role, TopicIn};
 use super::finding::{Finding, FindingKind, Severity};
 use super::judge::judge;
 use super::values::Pattern;
 use super::expectation;
-use crate::base::rhythm::{CLOSING_NS, DISCOVERY_NS, FEWEST};
+use crate::base::rhythm::{CLOSING_NS, DISCOVERY_NS};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::graph::history::Bound;
 use crate::graph::{Element, NodeId};
-use crate::mission::{Mission, RATE_CHANGE};
+use crate::mission::Mission;
 use crate::mission::event_log::{Event, Kind};
 
 pub(crate) use picture::{Side, pairs, union};
@@ -30,8 +30,6 @@ const DOUBTS: i64 = 8;
 const APART_NS: i64 = 2_000_000_000;
 /// The part of the time since the start by which two runs may drift: a fiftieth.
 const PACE: i64 = 50;
-/// The number of standard deviations beyond which rates differ significantly.
-const SIGMAS: f64 = 3.0;
 /// The fewest messages of a topic whose first and last are compared: with fewer, silences do not show a rhythm.
 const FEWEST_OF_TIMES: u64 = 20;
 
@@ -124,17 +122,9 @@ impl Difference {
     }
 }
 
-/// How rates are compared.
-struct RateLimits<'a> {
-    /// The fraction by which they must differ, besides significantly.
-    change: f64,
-    /// The topics whose rate in one mission is outside the range that `baseline` writes for the other one.
-    off: BTreeSet<&'a str>,
-}
-
-/// All differences: elements, then events, then times of topics, then what only a check finds with a baseline of the first. A rate
-/// must differ by more than the fraction `rate_change`, and significantly, or without one as a check finds it. Times since the
-/// start count unless a mission `is_part` of a recording.
+/// All differences: elements, then events, then times of topics, then what only a check finds with a baseline of the first. Rates
+/// differ if a check finds so, and by more than the fraction `rate_change`, if one is given. Times since the start count unless a
+/// mission `is_part` of a recording.
 pub(crate) fn differences(
     first: &Mission,
     second: &Mission,
@@ -147,14 +137,10 @@ pub(crate) fn differences(
     let lower = findings(second, first, is_part);
     let lower = lower.iter().filter(|f| f.kind == FindingKind::TopicRateLow);
     let off = found.iter().filter(|f| is_rate(f)).chain(lower);
-    let rates = RateLimits {
-        change: rate_change.unwrap_or(RATE_CHANGE),
-        off: off
-            .filter(|_| rate_change.is_none())
-            .map(|f| &*f.name)
-            .collect(),
-    };
-    let mut all = elements(facts, &rates);
+    let off: BTreeSet<&str> = off.map(|f| &*f.name).collect();
+    let change = rate_change.unwrap_or(SHARE);
+    let rate = |name: &str, both| rate(name, both, change).filter(|_| off.contains(name));
+    let mut all = elements(facts, rate);
     all.extend(events(facts));
     if facts.iter().any(|facts| facts.is_rewritten) {
         // Senders are unknown there, and so are ends and restarts of nodes.
@@ -219,7 +205,10 @@ fn unshown<'a>(
 }
 
 /// The nodes, topics and edges in only one mission, and the differences between those in both.
-fn elements(facts: &[Facts<'_>; 2], rates: &RateLimits<'_>) -> Vec<Difference> {
+fn elements<'a>(
+    facts: &'a [Facts<'a>; 2],
+    rate: impl Fn(&str, [TopicIn<'a>; 2]) -> Option<Difference>,
+) -> Vec<Difference> {
     let nodes = facts.each_ref().map(|facts| {
         let roles = facts.robot_roles();
         roles
@@ -250,7 +239,7 @@ fn elements(facts: &[Facts<'_>; 2], rates: &RateLimits<'_>) -> Vec<Difference> {
         if let Some(second) = topics[1].get(name) {
             let both = [*first, *second];
             values(name, both, &mut all);
-            all.extend(rate(name, both, rates));
+            all.extend(rate(name, both));
             edges(name, both, in_both, &mut all);
         }
     }
@@ -373,75 +362,20 @@ fn edges(
     }
 }
 
-/// The difference in the rate of a topic, if any.
-fn rate(name: &str, both: [TopicIn<'_>; 2], limits: &RateLimits<'_>) -> Option<Difference> {
-    let is_off = limits.off.contains(name);
-    let rates = both.map(|own| mean(&own.rates(true)));
-    if !is_off && !apart(rates, limits.change) {
-        return None;
-    }
-    let least = if is_off { SHARE } else { limits.change };
+/// The rates of a topic that differ by more than the fraction `change`, if any: while sending, or over the recording.
+fn rate(name: &str, both: [TopicIn<'_>; 2], change: f64) -> Option<Difference> {
     let sending = both.map(|own| own.facts.while_sending(own.id));
     let whole = both.map(|own| Some(own.facts.mean(own.id)?.hz()));
-    // The number that differs.
-    let differs = |[first, second]: [f64; 2]| (first - second).abs() > least * first.min(second);
-    let known = [(sending, "while sending"), (whole, "over the recording")];
-    let mut known = known
-        .iter()
-        .filter_map(|([a, b], word)| Some(([(*a)?, (*b)?], *word)));
-    let first = known.clone().find(|(rates, _)| differs(*rates));
-    let (rates, word) = first.or_else(|| known.next_back().filter(|_| !is_off))?;
+    let known = [(sending, "while sending"), (whole, "over the recording")].into_iter();
+    let mut known = known.filter_map(|([a, b], word)| Some(([a?, b?], word)));
+    let differs = |[a, b]: [f64; 2]| (a - b).abs() > change * a.min(b);
+    let (rates, word) = known.find(|(rates, _)| differs(*rates))?;
     let texts = rates.map(words::rate);
     let texts = [texts[0].clone(), format!("{} {word}", texts[1])];
     Some(Difference {
         rates: Some(rates),
         ..Difference::changed("rate", name, texts)
     })
-}
-
-/// The mean rate of a topic.
-#[derive(Clone, Copy)]
-struct MeanRate {
-    hz: f64,
-    /// Its uncertainty.
-    doubt: f64,
-}
-
-/// The mean rate of a topic; `None` with too few messages.
-fn mean(rates: &[Rate]) -> Option<MeanRate> {
-    let nanos: i64 = rates.iter().map(|r| r.span.nanos()).sum();
-    let (count, seconds) = (Rate::count(rates), nanos.max(1) as f64 / 1e9);
-    // The count of an even topic is exact to a message; a random one varies by its square root, bursts by more.
-    let chance = if Rate::are_even(rates) {
-        1.0
-    } else {
-        libm::sqrt(count as f64)
-    };
-    (count >= FEWEST).then(|| MeanRate {
-        hz: count as f64 / seconds,
-        doubt: (chance / seconds).max(spread(rates)),
-    })
-}
-
-/// Whether two rates differ by more than the fraction `change`, and significantly.
-fn apart(both: [Option<MeanRate>; 2], change: f64) -> bool {
-    let [Some(first), Some(second)] = both else {
-        return false;
-    };
-    let noise = SIGMAS * libm::sqrt(first.doubt * first.doubt + second.doubt * second.doubt);
-    let apart = libm::fabs(second.hz - first.hz);
-    apart > change * first.hz.min(second.hz) && apart > noise
-}
-
-/// The standard error of the mean rate, by how windows differ; 0 with fewer than two.
-fn spread(rates: &[Rate]) -> f64 {
-    let n = rates.len() as f64;
-    if rates.len() < 2 {
-        return 0.0;
-    }
-    let mean = rates.iter().map(Rate::hz).sum::<f64>() / n;
-    let squares = rates.iter().map(|r| (r.hz() - mean) * (r.hz() - mean));
-    libm::sqrt(squares.sum::<f64>() / (n - 1.0) / n)
 }
 
 /// The key of an event: its kind, the name it is about, and its number among the events of both, counted from 1.

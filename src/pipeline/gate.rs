@@ -187,7 +187,7 @@ pub fn check(job: &Check, watch: &mut dyn Watch) -> Result<Checked> {
 pub struct Diff {
     /// The missions.
     pub readings: [Reading; 2],
-    /// The fraction by which a rate must differ, besides significantly; `None` for what a check finds with a baseline of the first.
+    /// The fraction by which a rate must differ, besides significantly; `None` for what `baseline` allows.
     pub rate_change: Option<f64>,
     /// The names of the missions.
     pub subject: DiffSubject,
