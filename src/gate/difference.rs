@@ -8,11 +8,11 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::baseline::{self, SHARE};
+use super::expectation;
 use super::facts::{Facts, Role, TopicIn};
 use super::finding::{Finding, FindingKind, Severity};
 use super::judge::judge;
 use super::values::Pattern;
-use super::expectation;
 use crate::base::rhythm::{CLOSING_NS, DISCOVERY_NS};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;

@@ -294,7 +294,9 @@ mod tests {
         };
         let mission = mission(&["/robot1/nav/planner>/robot1/plan /robot1/amcl</robot1/plan"]);
         assert!(outline(&mission, &options).items.is_empty(), "{filter}");
-        check_filters(&mission.elements, &options).unwrap_err().hint()
+        check_filters(&mission.elements, &options)
+            .unwrap_err()
+            .hint()
     }
 
     #[test]

@@ -145,12 +145,9 @@ fn answer(mission: &Mission, element: Element, pieces: &[EvidenceLine]) -> Vec<S
             of(edge) && is_shown && matches!(what, Element::Publish(_)) == publishes
         });
         let named = edges.map(|(what, edge)| {
-            let lives = &all.seen(what).lives;
+            let start = all.seen(what).lives.first().map(|life| life.start);
             let text = format!("{} {}", name(edge), when(mission, what));
-            (
-                lives.first().map(|life| life.start),
-                text.trim_end().to_owned(),
-            )
+            (start, text.trim_end().to_owned())
         });
         let mut named: Vec<_> = named.collect();
         named.sort();
@@ -165,17 +162,12 @@ fn answer(mission: &Mission, element: Element, pieces: &[EvidenceLine]) -> Vec<S
             let unnamed = unnamed.map(|n| words::count(n as usize, "unnamed node"));
             let senders = [peers(true, &of, &node), unnamed].into_iter().flatten();
             let senders: Vec<String> = senders.collect();
+            let senders = (!senders.is_empty()).then(|| senders.join(", and by "));
             let receivers = peers(false, &of, &node);
-            let or = |known: String| {
-                if known.is_empty() {
-                    "no known node".to_owned()
-                } else {
-                    known
-                }
-            };
+            let or = |known: Option<String>| known.unwrap_or_else(|| "no known node".to_owned());
             vec![
-                format!("published by {}", or(senders.join(", and by "))),
-                format!("received by {}", or(receivers.unwrap_or_default())),
+                format!("published by {}", or(senders)),
+                format!("received by {}", or(receivers)),
             ]
         }
         Element::Node(id) => {
@@ -215,12 +207,8 @@ fn happened(mission: &Mission, element: Element, pieces: &[EvidenceLine]) -> Vec
             lines.extend(rows.iter().map(|row| row.text(None).trim_end().to_owned()));
         }
         if let (Element::Node(id), Kind::Stopped | Kind::Restarted) = (event.what, event.kind) {
-            lines.extend(logged(
-                mission,
-                elements.nodes[id].name.as_str(),
-                event.time,
-                pieces,
-            ));
+            let name = elements.nodes[id].name.as_str();
+            lines.extend(logged(mission, name, event.time, pieces));
         }
     }
     lines
