@@ -186,18 +186,42 @@ fn other_words(text: &str) -> Vec<String> {
     others.chain(counts.map(|pair| pair.join(" "))).collect()
 }
 
+/// The texts in quotes of a line of a program, without the values in templates.
+fn quoted(line: &str) -> Vec<String> {
+    let (mut texts, mut text, mut quote, mut depth) = (Vec::new(), String::new(), None, 0);
+    let mut characters = line.chars().peekable();
+    while let Some(c) = characters.next() {
+        match (c, quote) {
+            ('\\', _) => {
+                characters.next();
+            }
+            ('\'' | '"' | '`', None) => quote = Some(c),
+            ('$', Some('`')) if characters.peek() == Some(&'{') => depth += 1,
+            ('}', Some('`')) if depth > 0 => depth -= 1,
+            (c, Some(q)) if c == q && depth == 0 => {
+                texts.push(std::mem::take(&mut text));
+                quote = None;
+            }
+            (c, Some(_)) if depth == 0 => text.push(c),
+            _ => {}
+        }
+    }
+    texts
+}
+
 /// The text of a page without its program and its tags, and the sentences in its program.
 fn words_of_page(page: &str) -> String {
     let mut text = String::new();
     for (at, part) in page.split("<script").enumerate() {
         let (program, rest) = part.split_once("</script>").unwrap_or(("", part));
         let rest = if at == 0 { part } else { rest };
-        let outside = rest.split('>').filter_map(|tag| tag.split('<').next());
+        let styled = rest.split("<style");
+        let rest = styled.map(|own| own.split_once("</style>").map_or(own, |(_, rest)| rest));
+        let outside = rest.flat_map(|rest| rest.split('>').filter_map(|tag| tag.split('<').next()));
         text.extend(outside.flat_map(|words| [words, " "]));
-        let pieces = program.split(['\'', '`', '"', '{', '}']);
-        let is_code = |words: &str| words.contains(|c| "=;()[]&|<>$+".contains(c));
-        let sentences = pieces.filter(|words| words.contains(' ') && !is_code(words));
-        text.extend(sentences.flat_map(|words| [words, " "]));
+        let sentences = program.lines().flat_map(quoted);
+        let sentences = sentences.filter(|words| words.contains(' '));
+        text.extend(sentences.flat_map(|words| [words, " ".to_owned()]));
     }
     text
 }
@@ -386,15 +410,7 @@ fn commands_print_what_the_pages_show() {
             path.display()
         );
         let dir = folder();
-        let mut ran = commands(&text).into_iter();
         for (own, lines) in shown {
-            // The commands before may have written what these read.
-            let first = own[0];
-            ran.by_ref()
-                .take_while(|command| *command != first)
-                .for_each(|command| {
-                    run(command, dir.path());
-                });
             let outputs = own.iter().map(|command| run(command, dir.path()).stdout);
             let outputs = String::from_utf8(outputs.collect::<Vec<_>>().concat()).unwrap();
             let printed: Vec<&str> = outputs.lines().collect();

@@ -195,7 +195,7 @@ fn unshown<'a>(
         let is_shown =
             shown.contains(&*f.name) || senders.any(|role| shown.contains(role.as_str()));
         let late = [FindingKind::NodeLate, FindingKind::TopicLate];
-        !is_shown && !(is_moved && late.contains(&f.kind))
+        !(is_shown || is_moved && late.contains(&f.kind))
     });
     let own = own.map(|f| {
         let kind = f.kind.word().split('-').nth(1).unwrap_or_default();
