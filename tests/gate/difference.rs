@@ -222,7 +222,7 @@ fn graph_faults(number: usize) -> [(&'static str, Recording); 4] {
     };
     [
         changed("type changed", &|other| {
-            other.publishers[number].type_name = "std_msgs/Float64".to_owned();
+            "std_msgs/Float64".clone_into(&mut other.publishers[number].type_name);
         }),
         changed("publisher swapped", &|other| {
             other.publishers[number]
@@ -230,7 +230,7 @@ fn graph_faults(number: usize) -> [(&'static str, Recording); 4] {
                 .clone_from(&rhythms().publishers[0].node);
         }),
         changed("node renamed", &|other| {
-            other.publishers[number].node = "/other".to_owned();
+            "/other".clone_into(&mut other.publishers[number].node);
         }),
         changed("second publisher", &|other| {
             let topic = other.publishers[number].topic.clone();
