@@ -37,7 +37,7 @@ pub(crate) use frames::{BETWEEN_PHRASES, Words, joined};
 pub use frames::{Frame, Headline, Phrase};
 pub(crate) use listed::{DrawnPart, drawn_part};
 pub use marked::OngoingEvent;
-pub(crate) use omitted::{none_pass, nothing, unmatched, unmatched_topics};
+pub(crate) use omitted::{check_filters, none_pass, nothing, unmatched, unmatched_topics};
 pub use options::{Grouping, Hide, Mode, NameFilter, ViewOptions};
 use shown::sum;
 pub use shown::{Mark, Members, Shown, ShownRuns, TopicRow};

@@ -149,13 +149,87 @@ fn readme_shows_the_chart_of_the_example_report() {
     assert_eq!(chart(README), chart(&report));
 }
 
-/// Words that once meant what another word means now.
-const OTHER_WORDS: [&str; 2] = ["ledger", "chronicle"];
+/// The rows of the table of words: the term, and what it is not called.
+fn terms() -> Vec<(String, Vec<String>)> {
+    let text = chapter("words.md");
+    let table = text.split("| word | meaning | not |").nth(1).unwrap();
+    let rows = table.lines().skip(2).take_while(|l| l.starts_with('|'));
+    let rows = rows.map(|row| {
+        let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+        let others = cells[3].split(", ").map(str::to_owned).collect();
+        (cells[1].replace('*', ""), others)
+    });
+    rows.collect()
+}
+
+/// The words of a text that another term of the table replaces, also in the plural, and counts that do not say `changes`.
+fn other_words(text: &str) -> Vec<String> {
+    let plain = text
+        .to_lowercase()
+        .replace(|c: char| !c.is_alphanumeric() && c != '-', " ");
+    let words: Vec<&str> = plain.split_whitespace().collect();
+    let singular = |word: &str| match word.strip_suffix("ies") {
+        Some(stem) => format!("{stem}y"),
+        None => word.trim_end_matches('s').to_owned(),
+    };
+    let text = words.iter().map(|word| singular(word));
+    let text = format!(" {} ", text.collect::<Vec<_>>().join(" "));
+    let others = terms().into_iter().flat_map(|(_, others)| others);
+    let others = others.filter(|other| {
+        let other = other.split(' ').map(singular).collect::<Vec<_>>();
+        text.contains(&format!(" {} ", other.join(" ")))
+    });
+    let counts = words.windows(2).filter(|pair| {
+        let is_count = pair[0].chars().all(|c| c.is_ascii_digit());
+        is_count && ["events", "reconfigurations"].contains(&pair[1])
+    });
+    others.chain(counts.map(|pair| pair.join(" "))).collect()
+}
+
+/// The texts in quotes of a line of a program, without the values in templates.
+fn quoted(line: &str) -> Vec<String> {
+    let (mut texts, mut text, mut quote, mut depth) = (Vec::new(), String::new(), None, 0);
+    let mut characters = line.chars().peekable();
+    while let Some(c) = characters.next() {
+        match (c, quote) {
+            ('\\', _) => {
+                characters.next();
+            }
+            ('\'' | '"' | '`', None) => quote = Some(c),
+            ('$', Some('`')) if characters.peek() == Some(&'{') => depth += 1,
+            ('}', Some('`')) if depth > 0 => depth -= 1,
+            (c, Some(q)) if c == q && depth == 0 => {
+                texts.push(std::mem::take(&mut text));
+                quote = None;
+            }
+            (c, Some(_)) if depth == 0 => text.push(c),
+            _ => {}
+        }
+    }
+    texts
+}
+
+/// The text of a page without its program and its tags, and the sentences in its program.
+fn words_of_page(page: &str) -> String {
+    let mut text = String::new();
+    for (at, part) in page.split("<script").enumerate() {
+        let (program, rest) = part.split_once("</script>").unwrap_or(("", part));
+        let rest = if at == 0 { part } else { rest };
+        let styled = rest.split("<style");
+        let rest = styled.map(|own| own.split_once("</style>").map_or(own, |(_, rest)| rest));
+        let outside = rest.flat_map(|rest| rest.split('>').filter_map(|tag| tag.split('<').next()));
+        text.extend(outside.flat_map(|words| [words, " "]));
+        let sentences = program.lines().flat_map(quoted);
+        let sentences = sentences.filter(|words| words.contains(' '));
+        text.extend(sentences.flat_map(|words| [words, " ".to_owned()]));
+    }
+    text
+}
 
 #[test]
-fn help_docs_and_outputs_use_the_defined_words() {
-    let defined = first_cells(&chapter("words.md"), "| word | meaning |");
-    for word in [
+fn help_docs_and_outputs_use_the_words_of_the_table_and_no_other() {
+    let terms: Vec<String> = terms().into_iter().map(|(term, _)| term).collect();
+    for term in [
         "event",
         "change",
         "reconfiguration",
@@ -163,48 +237,195 @@ fn help_docs_and_outputs_use_the_defined_words() {
         "step",
         "window",
         "rule, finding",
+        "rate while sending",
+        "rate over the recording",
     ] {
-        assert!(defined.iter().any(|own| own.starts_with(word)), "{word}");
+        assert!(terms.iter().any(|own| own == term), "{term}: {terms:?}");
     }
     let dir = folder();
+    let here = dir.path();
+    let graph = root().join("examples/ci/graph.yaml");
+    fs::copy(graph, here.join("graph.yaml")).unwrap();
     let mut texts: Vec<(String, String)> = Vec::new();
-    for (path, text) in pages() {
-        texts.push((path.display().to_string(), text));
+    let written = [
+        "README.md",
+        "CHANGELOG.md",
+        "examples/README.md",
+        "python/README.md",
+        "python/bagreel/__init__.py",
+    ];
+    let written = written.map(|name| root().join(name));
+    let chapters = pages().into_iter().map(|(path, _)| path);
+    for path in chapters
+        .chain(written)
+        .filter(|path| !path.ends_with("words.md"))
+    {
+        let text = fs::read_to_string(&path).unwrap();
+        // The table of the changelog has the words of old versions.
+        let is_old = |line: &&str| path.ends_with("CHANGELOG.md") && line.starts_with('|');
+        let text: Vec<&str> = text.lines().filter(|line| !is_old(line)).collect();
+        texts.push((path.display().to_string(), text.join("\n")));
     }
     for command in &help_commands() {
         texts.push((command.clone(), help(&[command, "--help"])));
+        texts.push((command.clone(), help(&["man", command])));
     }
     for command in [
-        "bagreel info run.bag",
-        "bagreel events run.bag --phases auto --parts --all",
-        "bagreel diff run.bag run.mcap",
-        "bagreel render run.bag -o - --format md",
-        "bagreel check run.mcap --expect graph.yaml",
+        "info run.bag",
+        "info run.mcap --why /cmd_vel",
+        "info bags",
+        "events run.bag --phases auto --parts --all",
+        "events run.mcap --format csv",
+        "events run.mcap --format markdown",
+        "diff run.bag run.mcap",
+        "diff run.bag run.mcap --format markdown",
+        "render run.bag --period 30 -o out/x.html -o out/x.md -o out/x.csv -o out/x.svg",
+        "figure run.bag -o out/f.svg -o out/f.tex",
+        "check run.mcap --expect graph.yaml",
+        "check run.mcap --expect graph.yaml --format junit",
+        "check run.mcap --expect graph.yaml --format markdown",
+        "follow run.mcap --expect graph.yaml",
+        "baseline run.mcap",
+        "extract run.bag -o out/m.csv --start 0 --end 1",
+        "tables bags -o out/t",
+        "render run.bag --topic-filter /nosuch",
+        "figure run.mcap --kind holders",
     ] {
-        let graph = root().join("examples/ci/graph.yaml");
-        fs::copy(graph, dir.path().join("graph.yaml")).unwrap();
-        let text = String::from_utf8(run(command, dir.path()).stdout).unwrap();
-        assert!(!text.is_empty(), "{command}");
-        texts.push((command.to_owned(), text));
+        let output = run(&format!("bagreel {command}"), here);
+        let text = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+        assert!(!text.concat().is_empty(), "{command}");
+        texts.push((command.to_owned(), text.concat()));
     }
-    for (name, text) in &texts {
-        let text = text.to_lowercase();
-        for word in OTHER_WORDS {
-            assert!(!text.contains(word), "{name}: {word}");
+    for file in fs::read_dir(here.join("out")).unwrap() {
+        let path = file.unwrap().path();
+        let Ok(text) = fs::read_to_string(&path) else {
+            continue;
+        };
+        // A table has words of its own in its head only: the rest are names of the bag.
+        let text = match path.extension().and_then(|e| e.to_str()) {
+            Some("html" | "svg") => words_of_page(&text),
+            Some("csv") => text.lines().next().unwrap().to_owned(),
+            _ => text,
+        };
+        texts.push((path.display().to_string(), text));
+    }
+    let kinds = texts.len();
+    let wrong = texts.iter().flat_map(|(name, text)| {
+        let words = other_words(text).into_iter();
+        words.map(move |word| format!("{name}: {word}"))
+    });
+    assert_eq!(wrong.collect::<Vec<String>>(), [""; 0]);
+    assert!(kinds > 60, "{kinds} texts");
+}
+
+#[test]
+fn another_word_for_a_term_is_found() {
+    for text in [
+        "The ledger has 42 changes.",
+        "`x.ledgers.csv`",
+        "Entries:",
+        "at a mean rate of 5 Hz",
+        "42 events",
+        "the stages of a mission",
+    ] {
+        assert_eq!(other_words(text).len(), 1, "{text}");
+    }
+    assert_eq!(
+        other_words("42 changes in 3 phases, 5 Hz while sending"),
+        [""; 0]
+    );
+    let page = "<p id=\"entry\">a <b>stage</b><script>f('no entry', entry)</script> end";
+    assert_eq!(other_words(&words_of_page(page)).len(), 2);
+}
+
+/// The whole number before each `changes` in a text.
+fn counted_changes(text: &str) -> Vec<usize> {
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let pairs = words.windows(2);
+    let pairs =
+        pairs.filter(|pair| pair[1].trim_matches(|c: char| !c.is_alphabetic()) == "changes");
+    pairs.filter_map(|pair| pair[0].parse().ok()).collect()
+}
+
+#[test]
+fn every_output_counts_the_same_changes() {
+    let dir = folder();
+    for bag in ["run.bag", "run.mcap"] {
+        let printed = |command: &str| {
+            let output = run(&command.replace("BAG", bag), dir.path());
+            let text = [output.stdout, output.stderr].concat();
+            String::from_utf8(text).unwrap()
+        };
+        let changes = printed("bagreel events BAG --format ndjson")
+            .lines()
+            .count();
+        assert!(changes > 10, "{bag}: {changes}");
+        for command in [
+            "bagreel info BAG",
+            "bagreel events BAG",
+            "bagreel render BAG -o x.md",
+            "bagreel figure BAG -o x.svg",
+        ] {
+            let counts = counted_changes(&printed(command));
+            assert_eq!(counts.first(), Some(&changes), "{command}");
         }
-        // What is counted as changes is not called otherwise.
-        let words: Vec<&str> = text.split_whitespace().collect();
-        let counts = words
-            .windows(2)
-            .filter(|pair| pair[0].parse::<u32>().is_ok());
-        for pair in counts {
-            let word = pair[1].trim_matches(|c: char| !c.is_alphanumeric());
-            assert!(
-                !["events", "reconfigurations", "entries"].contains(&word),
-                "{name}: {pair:?}"
-            );
+        let report = fs::read_to_string(dir.path().join("x.md")).unwrap();
+        assert_eq!(counted_changes(&report).first(), Some(&changes), "{bag}");
+        let rows = printed("bagreel info BAG --format csv");
+        let mut rows = rows.lines().map(|row| row.split(',').collect::<Vec<_>>());
+        let (heads, row) = (rows.next().unwrap(), rows.next().unwrap());
+        let of = |name: &str| -> usize {
+            let at = heads.iter().position(|head| *head == name).unwrap();
+            row[at].parse().unwrap()
+        };
+        let kinds = ["starts", "stops", "restarts", "rates"].map(of);
+        assert!(kinds.iter().sum::<usize>() <= changes, "{bag}: {kinds:?}");
+    }
+}
+
+/// Each block of output on a page, with the commands of the block before it.
+fn shown_outputs(text: &str) -> Vec<(Vec<&str>, Vec<&str>)> {
+    let mut blocks = text.split("```").skip(1).step_by(2).peekable();
+    let mut shown = Vec::new();
+    while let Some(block) = blocks.next() {
+        let output = blocks.peek().and_then(|next| next.strip_prefix("text\n"));
+        if let (Some(script), Some(output)) = (block.strip_prefix("sh\n"), output) {
+            let commands = script.lines().filter(|line| line.starts_with("bagreel "));
+            shown.push((commands.collect(), output.lines().collect()));
         }
     }
+    shown
+}
+
+#[test]
+fn commands_print_what_the_pages_show() {
+    let mut compared = 0;
+    for (path, text) in pages() {
+        let blocks = text.matches("```text\n").count();
+        let shown = shown_outputs(&text);
+        assert_eq!(
+            shown.len(),
+            blocks,
+            "{}: output without a command",
+            path.display()
+        );
+        let dir = folder();
+        for (own, lines) in shown {
+            let outputs = own.iter().map(|command| run(command, dir.path()).stdout);
+            let outputs = String::from_utf8(outputs.collect::<Vec<_>>().concat()).unwrap();
+            let printed: Vec<&str> = outputs.lines().collect();
+            let mut rest = &printed[..];
+            for part in lines.split(|line| *line == "…") {
+                let at = rest.windows(part.len()).position(|own| own == part);
+                let at = at.unwrap_or_else(|| {
+                    panic!("{}: {part:#?}\nis not in\n{outputs}", path.display())
+                });
+                rest = &rest[at + part.len()..];
+            }
+            compared += 1;
+        }
+    }
+    assert!(compared >= 6, "{compared} outputs");
 }
 
 #[test]

@@ -645,6 +645,16 @@ fn two_runs_a_day_apart_are_not_one_mission() {
         code == 2 && said.contains("`next.bag` begins 23 h 57 min after `day.bag` ends"),
         "{code} {said}"
     );
+    // Years apart, one of the clocks is taken to be wrong.
+    let mut old = recording(HEALTHY, 0);
+    later(&mut old, -90_000_000);
+    bag(here, "old.bag", &old);
+    let check = ["check", "day.bag", "old.bag", "--expect", "graph.yaml"];
+    let (code, said) = run(here, &check);
+    assert!(
+        code == 2 && said.contains("--offset old.bag="),
+        "{code} {said}"
+    );
     for command in ["info", "events"] {
         let (code, said) = run(here, &[command, "day.bag", "next.bag"]);
         let first = said.lines().find(|line| line.starts_with("note: "));

@@ -288,7 +288,7 @@ fn every_change_in_json_names_its_event() {
         let windows = mission["windows"].as_array().unwrap().iter();
         let changes = windows.flat_map(|window| window["changes"].as_array().unwrap());
         for change in changes {
-            log.kind(change["entry"].as_u64().unwrap());
+            log.kind(change["event"].as_u64().unwrap());
         }
     }
 }

@@ -139,7 +139,7 @@ const SAYS: &[(&str, &str, &str, &str)] = &[
     ("render", "r.bag -o out/x.json", "--ns-filter /ns/.*", "data contains what the filters choose: 2 of "),
     ("info", "r.bag", "--verify", "a second reader counts the same"),
     ("render", "r.bag -o out/x.svg", "--hide services", "`--hide services` leaves nothing out"),
-    ("extract", "r.bag -o out/x.csv", "--topic-filter /chta", "matches no topic; the nearest name is `/chat`"),
+    ("extract", "r.bag -o out/x.csv", "--topic-filter /chat,/chta", "matches no topic; the nearest name is `/chat`"),
     ("extract", "r.bag -o out/x.csv --topic-filter /chat", "--start 22.1", "no message of these topics is in that time"),
     ("events", "s.mcap", "--source ws", "have no times"),
     ("follow", "r.bag", "--idle 1ms", "nothing was written for"),

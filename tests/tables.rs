@@ -80,7 +80,7 @@ fn rows_are_filtered_by_topic_and_time() {
     );
     assert!(said.contains("select nothing"), "{said}");
     assert!(!dir.path().join("x.csv").exists());
-    // A mistyped name is reported.
+    // A mistyped name is an error.
     let nothing = [
         "extract",
         WAREHOUSE,
@@ -89,11 +89,12 @@ fn rows_are_filtered_by_topic_and_time() {
         "--topic-filter",
         "/robot1/odm",
     ];
-    let said = ends(dir.path(), &nothing, 0);
+    let said = ends(dir.path(), &nothing, 2);
     assert!(
-        said.contains("matches no topic; the nearest name is `/robot1/odom`"),
+        said.contains("hint: the nearest name is `/robot1/odom`"),
         "{said}"
     );
+    assert!(!dir.path().join("x.csv").exists());
 }
 
 #[test]

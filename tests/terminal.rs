@@ -565,7 +565,7 @@ fn names_without_a_match_are_reported_with_the_nearest() {
     let folder = folder();
     for (option, value, says) in [
         ("--collapse", "/robt1", "`/robot1`"),
-        ("--topic-filter", "/scam", "matches no topic; "),
+        ("--topic-filter", "/robot1/.*,/scam", "matches no topic; "),
         ("--ns-filter", "/.*,-/map_servr", "`/map_server`"),
         (
             "--collapse",

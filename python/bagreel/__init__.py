@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 from . import _bagreel, _results
 from ._bagreel import BagreelError, Mission, Table, __version__
-from ._command import Bags, Paths, given, run, texts
+from ._command import Bags, Paths, given, listed, run, texts
 from ._results import Check, Diff, Rendered, Shown
 
 __all__ = [
@@ -64,8 +64,12 @@ def read(
     *,
     period: str | float | None = None,
     align: Literal["clock", "bag"] = "bag",
+    step: str | float | None = None,
+    cut: Literal["phases", "changes"] | None = None,
     start: str | None = None,
     end: str | None = None,
+    rate_change: float | None = None,
+    phases: str | os.PathLike[str] | None = None,
     offset: Iterable[str] = (),
     ns: Iterable[str] = (),
     topology: Iterable[str | os.PathLike[str]] = (),
@@ -78,7 +82,9 @@ def read(
     """
     period = None if period is None else str(period)
     options: dict[str, Any] = {"start": start, "end": end, "source": source, "infer": infer}
-    options |= {"offset": list(offset), "ns": list(ns), "topology": list(topology)}
+    options |= {"step": step, "cut": cut, "rate_change": rate_change, "phases": phases}
+    offset, ns, topology = listed(offset=offset, ns=ns, topology=topology)
+    options |= {"offset": offset, "ns": ns, "topology": topology}
     if not any(options.values()):
         return _bagreel.read(texts(uris), period=period, align=align)
     with tempfile.TemporaryDirectory(prefix="bagreel-") as folder:
@@ -136,8 +142,8 @@ def render(
     """Draws and writes outputs, as `bagreel render` does; the options are those of the command, lists for repeatable
     ones. Returns the files, of which a notebook shows the first. Raises `BagreelError` with the command's message.
     """
-    offset, ns, topology = list(offset), list(ns), list(topology)
-    collapse, link = list(collapse), list(link)
+    offset, ns, topology = listed(offset=offset, ns=ns, topology=topology)
+    collapse, link = listed(collapse=collapse, link=link)
     options = given(locals(), "bags", "outputs")
     outputs = texts(outputs)
     run("render", bags, output=outputs, **options)
@@ -148,7 +154,7 @@ def figure(
     bags: Bags,
     outputs: Paths,
     *,
-    kind: Literal["lives", "graph", "steps"] = "lives",
+    kind: Literal["lives", "graph", "holders", "steps"] = "lives",
     width: str | None = None,
     rows: str | None = None,
     steps: str | None = None,
@@ -167,10 +173,10 @@ def figure(
     source: str | os.PathLike[str] | None = None,
     infer: str | None = None,
 ) -> Rendered:
-    """Draws a figure for a paper, as `bagreel figure` does: lifelines, the graph of publishers and subscribers, or the
-    reconfigurations one by one; `width` is its width on paper (default 88mm).
+    """Draws a figure for a paper, as `bagreel figure` does: lifelines, the graph of publishers and subscribers, the holders
+    of topics that change hands, or the reconfigurations one by one; `width` is its width on paper (default 88mm).
     """
-    offset, ns, topology = list(offset), list(ns), list(topology)
+    offset, ns, topology = listed(offset=offset, ns=ns, topology=topology)
     options = given(locals(), "bags", "outputs")
     outputs = texts(outputs)
     run("figure", bags, output=outputs, **options)
@@ -203,7 +209,7 @@ def show(
 
     If a notebook viewer removes embedded pages, a still picture of the whole mission is shown instead.
     """
-    collapse = list(collapse)
+    (collapse,) = listed(collapse=collapse)
     options = given(locals(), "bags", "height")
     with tempfile.TemporaryDirectory(prefix="bagreel-") as folder:
         page, still = Path(folder) / "player.html", Path(folder) / "still.svg"
@@ -225,13 +231,14 @@ def events(
     start: str | None = None,
     end: str | None = None,
     topology: Iterable[str | os.PathLike[str]] = (),
+    source: str | os.PathLike[str] | None = None,
     infer: str | None = None,
 ) -> list[dict[str, Any]]:
     """The event log: starts, stops, restarts, rate changes, takeovers, in order of time; a dict each.
 
     `parts` adds the parts of each event, `all` housekeeping and the recorder.
     """
-    offset, ns, topology = list(offset), list(ns), list(topology)
+    offset, ns, topology = listed(offset=offset, ns=ns, topology=topology)
     _, text = run("events", bags, format="ndjson", **given(locals(), "bags"))
     return [json.loads(line) for line in text.splitlines()]
 
@@ -246,7 +253,7 @@ def baseline(
     topology: Iterable[str | os.PathLike[str]] = (),
 ) -> str:
     """The expectations that all of these healthy runs (one bag each) meet, as YAML; also written to `output`, if given."""
-    topology = list(topology)
+    (topology,) = listed(topology=topology)
     _, text = run("baseline", bags, output="-", **given(locals(), "bags", "output"))
     if output is not None:
         Path(output).write_text(text, encoding="utf-8")
@@ -268,7 +275,7 @@ def check(
 
     Raises `BagreelError` if the bag or the expectation cannot be read.
     """
-    topology = list(topology)
+    (topology,) = listed(topology=topology)
     options = given(locals(), "bags")
     with tempfile.TemporaryDirectory(prefix="bagreel-") as folder:
         text, markdown = Path(folder) / "check.txt", Path(folder) / "check.md"

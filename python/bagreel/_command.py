@@ -20,11 +20,19 @@ Bags = Paths | Mission
 DONE = (0, 3)
 
 
-def texts(paths: Paths) -> list[str]:
-    """One path, or several, as texts."""
+def texts(paths: Paths, name: str = "paths") -> list[str]:
+    """One path or text, or several, as texts; `name` is that of the argument."""
     if isinstance(paths, (str, os.PathLike)):
         paths = [paths]
-    return [os.fspath(path) for path in paths]
+    try:
+        return [os.fspath(path) for path in paths]
+    except TypeError:
+        raise TypeError(f"{name}={paths!r} is no path or text, and no list of these") from None
+
+
+def listed(**options: Paths) -> list[list[str]]:
+    """The values of repeatable options, of which one may be a text."""
+    return [texts(value, name) for name, value in options.items()]
 
 
 def given(values: Mapping[str, Any], *others: str) -> dict[str, Any]:
@@ -63,4 +71,5 @@ def run(command: str, *bags: Bags, fine: tuple[int, ...] = DONE, **options: Any)
         done = subprocess.run(args, capture_output=True, encoding="utf-8", check=False)
     if done.returncode in DONE or done.returncode in fine and done.stdout:
         return done.returncode, done.stdout
-    raise BagreelError(done.stderr.strip() or f"the command ended with {done.returncode}")
+    said, _, _ = done.stderr.removeprefix("error: ").partition("\n\nFor more information")
+    raise BagreelError(said.strip() or f"the command ended with {done.returncode}")

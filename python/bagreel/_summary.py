@@ -18,7 +18,7 @@ def html(mission: Mission) -> str:
         (len(mission.nodes), "nodes"),
         (len(mission.topics), "topics"),
         (mission.messages, "messages"),
-        (len(mission.events), "events"),
+        (len(mission.events), "changes"),
     ]
     numbers = " · ".join(f"{n:,.0f} {what}" if n >= 10 else f"{n:.3g} {what}" for n, what in counts)
     head = f"<p><b>{markup.escape(', '.join(mission.bags))}</b>: {numbers}</p>"

@@ -40,7 +40,7 @@ fn raised(error: &Error) -> PyErr {
 fn period(text: &str) -> PyResult<Period> {
     let bad = || {
         PyValueError::new_err(format!(
-            "`{text}` is not a period: write `60`, `30s`, `1m` or `500ms`"
+            "period={text:?} is no length of time: give `60`, `30s`, `1m` or `500ms`"
         ))
     };
     Period::parse(text).ok_or_else(bad)
@@ -51,7 +51,7 @@ fn align(text: &str) -> PyResult<Align> {
         "clock" => Ok(Align::Clock),
         "bag" => Ok(Align::Bag),
         _ => Err(PyValueError::new_err(format!(
-            "`{text}` is neither `clock` nor `bag`"
+            "align={text:?} is neither `clock` nor `bag`"
         ))),
     }
 }
@@ -199,8 +199,8 @@ impl Mission {
     fn __repr__(&self) -> String {
         // As many as `events` has.
         let events = log(&self.0, LogFormat::Ndjson, LogOptions::default());
-        let (windows, events) = (self.0.windows.len(), events.lines().count());
-        format!("<bagreel.Mission: {windows} windows, {events} events>")
+        let (windows, changes) = (self.0.windows.len(), events.lines().count());
+        format!("<bagreel.Mission: {windows} windows, {changes} changes>")
     }
 }
 

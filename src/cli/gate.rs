@@ -18,7 +18,6 @@ use crate::export::target::Target;
 use crate::gate::{FORMATS, Judgement, ReportFormat, Severity, explain};
 use crate::graph::window::Length;
 use crate::mission::Mission;
-use crate::mission::RATE_CHANGE;
 use crate::pipeline::{self, Baseline, Check, Diff, Reading, Report};
 
 #[derive(Debug, Args)]
@@ -35,9 +34,9 @@ pub(super) struct DiffArgs {
     /// Also write this file: `.txt`, `.json`, `.md`, or a picture of both in any format of `render`. Repeatable.
     #[arg(long = "output", short, value_name = "FILE")]
     outputs: Vec<OsString>,
-    /// Report rates that differ by more than this fraction, if statistically significant.
-    #[arg(long, value_name = "SHARE", default_value_t = RATE_CHANGE, value_parser = share)]
-    rate_change: f64,
+    /// Report rates that differ by more than this fraction, if statistically significant. [default: what `baseline` allows]
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    rate_change: Option<f64>,
     #[command(flatten)]
     range: RangeArgs,
 }

@@ -24,7 +24,7 @@ const LONGEST: usize = 1000;
 const HEAD: usize = 1 << 16;
 
 /// The fraction by which a rate may differ between runs.
-const SHARE: f64 = 0.1;
+pub(super) const SHARE: f64 = 0.1;
 /// The fraction by which the mean rate of an uneven topic may differ between runs.
 const MEAN_SHARE: f64 = 0.15;
 /// The allowed silence, as a multiple of the longest in the runs.

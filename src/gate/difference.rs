@@ -3,12 +3,17 @@
 mod picture;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 use serde::Serialize;
 
-use super::facts::{Facts, Rate, Role, TopicIn};
+use super::baseline::{self, SHARE};
+use super::expectation;
+use super::facts::{Facts, Role, TopicIn};
+use super::finding::{Finding, FindingKind, Severity};
+use super::judge::judge;
 use super::values::Pattern;
-use crate::base::rhythm::{CLOSING_NS, DISCOVERY_NS, FEWEST, FEWEST_OF_MEAN};
+use crate::base::rhythm::{CLOSING_NS, DISCOVERY_NS};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::graph::history::Bound;
@@ -25,12 +30,6 @@ const DOUBTS: i64 = 8;
 const APART_NS: i64 = 2_000_000_000;
 /// The part of the time since the start by which two runs may drift: a fiftieth.
 const PACE: i64 = 50;
-/// The number of standard deviations beyond which rates differ significantly.
-const SIGMAS: f64 = 3.0;
-/// The fraction by which the mean rate of an uneven topic may differ: such a topic depends on what happens in a run.
-const UNEVEN_CHANGE: f64 = 0.5;
-/// How many times the messages of a topic in one run are more than in another: what happens in a run makes less of a difference.
-const FAR: f64 = 4.0;
 /// The fewest messages of a topic whose first and last are compared: with fewer, silences do not show a rhythm.
 const FEWEST_OF_TIMES: u64 = 20;
 
@@ -123,11 +122,25 @@ impl Difference {
     }
 }
 
-/// All differences: elements, then events, then times of topics. A rate must differ by more than the fraction
-/// `rate_change`, and significantly.
-pub(crate) fn differences(first: &Mission, second: &Mission, rate_change: f64) -> Vec<Difference> {
+/// All differences: elements, then events, then times of topics, then what only a check finds with a baseline of the first. Rates
+/// differ if a check finds so, and by more than the fraction `rate_change`, if one is given. Times since the start count unless a
+/// mission `is_part` of a recording.
+pub(crate) fn differences(
+    first: &Mission,
+    second: &Mission,
+    rate_change: Option<f64>,
+    is_part: bool,
+) -> Vec<Difference> {
     let facts = &[Facts::new(first), Facts::new(second)];
-    let mut all = elements(facts, rate_change);
+    let found = findings(first, second, is_part);
+    // Few messages have no range that many could exceed.
+    let lower = findings(second, first, is_part);
+    let lower = lower.iter().filter(|f| f.kind == FindingKind::TopicRateLow);
+    let off = found.iter().filter(|f| is_rate(f)).chain(lower);
+    let off: BTreeSet<&str> = off.map(|f| &*f.name).collect();
+    let change = rate_change.unwrap_or(SHARE);
+    let rate = |name: &str, both| rate(name, both, change).filter(|_| off.contains(name));
+    let mut all = elements(facts, rate);
     all.extend(events(facts));
     if facts.iter().any(|facts| facts.is_rewritten) {
         // Senders are unknown there, and so are ends and restarts of nodes.
@@ -144,39 +157,58 @@ pub(crate) fn differences(first: &Mission, second: &Mission, rate_change: f64) -
     };
     all.retain(|d| !(d.kind == "event" && d.name.ends_with(" silent") && ends(d)));
     all.extend(times);
-    let counts = counts(facts, &all);
-    all.extend(counts);
+    let counted = found.iter();
+    let counted = counted.filter(|f| rate_change.is_none() || !is_rate(f));
+    let more = unshown(facts, counted, &all);
+    all.extend(more);
     all
 }
 
-/// The topics of which one mission has far fewer messages than the other, unless a difference of the topic or of a publisher
-/// shows that. Pauses and bursts hide it in rates and times, as when a topic falls from 803 messages to 3.
-fn counts(facts: &[Facts<'_>; 2], known: &[Difference]) -> Vec<Difference> {
-    let theirs = topics(&facts[1]);
-    let own = topics(&facts[0]).into_iter().filter_map(|(name, first)| {
-        let both = [first, *theirs.get(name)?];
-        let is_reported = known.iter().any(|d| {
-            let mut publishers = both.iter().flat_map(TopicIn::publishers);
-            d.is_known && (d.element == name || publishers.any(|role| role == d.element))
-        });
-        let counts = both.map(|own| own.facts.messages(own.id));
-        let seconds = both.map(|own| own.facts.mission.span.nanos() as f64);
-        let [few, many] = if counts[0] as f64 / seconds[0] < counts[1] as f64 / seconds[1] {
-            [0, 1]
-        } else {
-            [1, 0]
-        };
-        // As many as the shorter recording would have of the other one.
-        let due = counts[many] as f64 * (seconds[few] / seconds[many]).min(1.0);
-        let is_far = due >= FEWEST_OF_MEAN as f64 && due > FAR * counts[few] as f64;
-        let texts = counts.map(|count| count.to_string());
-        (is_far && !is_reported).then(|| Difference::changed("messages", name, texts))
+/// What is wrong about the second mission by a baseline of the first.
+fn findings(first: &Mission, second: &Mission, is_part: bool) -> Vec<Finding> {
+    let written = baseline::write(std::slice::from_ref(first), is_part, "");
+    let read = expectation::read(&written.text, Path::new("baseline"));
+    let checks = read.map(|read| judge(&read, second, is_part).checks);
+    let all = checks.into_iter().flatten().flat_map(|c| c.findings);
+    all.filter(|f| f.severity == Severity::Error).collect()
+}
+
+fn is_rate(finding: &Finding) -> bool {
+    let kinds = [FindingKind::TopicRateLow, FindingKind::TopicRateHigh];
+    kinds.contains(&finding.kind)
+}
+
+/// The findings that no difference of the same name or of a publisher shows.
+fn unshown<'a>(
+    facts: &[Facts<'_>; 2],
+    found: impl Iterator<Item = &'a Finding>,
+    known: &[Difference],
+) -> Vec<Difference> {
+    let known = || known.iter().filter(|d| d.is_known);
+    let shown: BTreeSet<&str> = known().flat_map(|d| d.element.split(" → ")).collect();
+    // If everything is delayed, one difference shows it.
+    let is_moved = known().any(|d| ["time", "begin"].contains(&d.kind));
+    let topics = topics(&facts[0]);
+    let own = found.filter(|f| {
+        let publishers = topics.get(&*f.name).map(TopicIn::publishers);
+        let mut senders = publishers.iter().flatten();
+        let is_shown =
+            shown.contains(&*f.name) || senders.any(|role| shown.contains(role.as_str()));
+        let late = [FindingKind::NodeLate, FindingKind::TopicLate];
+        !(is_shown || is_moved && late.contains(&f.kind))
+    });
+    let own = own.map(|f| {
+        let kind = f.kind.word().split('-').nth(1).unwrap_or_default();
+        Difference::changed(kind, &*f.name, [&*f.expected, &*f.seen])
     });
     own.collect()
 }
 
 /// The nodes, topics and edges in only one mission, and the differences between those in both.
-fn elements(facts: &[Facts<'_>; 2], rate_change: f64) -> Vec<Difference> {
+fn elements<'a>(
+    facts: &'a [Facts<'a>; 2],
+    rate: impl Fn(&str, [TopicIn<'a>; 2]) -> Option<Difference>,
+) -> Vec<Difference> {
     let nodes = facts.each_ref().map(|facts| {
         let roles = facts.robot_roles();
         roles
@@ -207,7 +239,7 @@ fn elements(facts: &[Facts<'_>; 2], rate_change: f64) -> Vec<Difference> {
         if let Some(second) = topics[1].get(name) {
             let both = [*first, *second];
             values(name, both, &mut all);
-            all.extend(rate(name, both, rate_change));
+            all.extend(rate(name, both));
             edges(name, both, in_both, &mut all);
         }
     }
@@ -330,80 +362,20 @@ fn edges(
     }
 }
 
-/// The difference in the rate of a topic, if any.
-fn rate(name: &str, both: [TopicIn<'_>; 2], rate_change: f64) -> Option<Difference> {
-    let rates = both.map(|own| own.rates(true));
-    let in_windows = apart(rates.each_ref().map(|own| mean(own)), rate_change);
-    let is_uneven = !rates.iter().all(|own| Rate::are_even(own));
-    let different = in_windows.or_else(|| {
-        let [first, second] = both.map(|own| own.facts.mean(own.id));
-        let whole = [first?, second?];
-        let is_enough = is_uneven && whole.iter().all(|r| r.count + 1 >= FEWEST_OF_MEAN);
-        let change = rate_change.max(UNEVEN_CHANGE);
-        is_enough.then(|| apart(whole.map(|r| mean(&[r])), change))?
-    });
-    different?;
+/// The rates of a topic that differ by more than the fraction `change`, if any: while sending, or over the recording.
+fn rate(name: &str, both: [TopicIn<'_>; 2], change: f64) -> Option<Difference> {
     let sending = both.map(|own| own.facts.while_sending(own.id));
     let whole = both.map(|own| Some(own.facts.mean(own.id)?.hz()));
-    // The number that differs.
-    let differs =
-        |[first, second]: [f64; 2]| (first - second).abs() > rate_change * first.min(second);
-    let known = [(sending, "while sending"), (whole, "over the recording")];
-    let mut known = known
-        .iter()
-        .filter_map(|([a, b], word)| Some(([(*a)?, (*b)?], *word)));
-    let first = known.clone().find(|(rates, _)| differs(*rates));
-    let (rates, word) = first.or_else(|| known.next_back())?;
+    let known = [(sending, "while sending"), (whole, "over the recording")].into_iter();
+    let mut known = known.filter_map(|([a, b], word)| Some(([a?, b?], word)));
+    let differs = |[a, b]: [f64; 2]| (a - b).abs() > change * a.min(b);
+    let (rates, word) = known.find(|(rates, _)| differs(*rates))?;
     let texts = rates.map(words::rate);
     let texts = [texts[0].clone(), format!("{} {word}", texts[1])];
     Some(Difference {
         rates: Some(rates),
         ..Difference::changed("rate", name, texts)
     })
-}
-
-/// The mean rate of a topic.
-#[derive(Clone, Copy)]
-struct MeanRate {
-    hz: f64,
-    /// Its uncertainty.
-    doubt: f64,
-}
-
-/// The mean rate of a topic; `None` with too few messages.
-fn mean(rates: &[Rate]) -> Option<MeanRate> {
-    let nanos: i64 = rates.iter().map(|r| r.span.nanos()).sum();
-    let (count, seconds) = (Rate::count(rates), nanos.max(1) as f64 / 1e9);
-    // The count of an even topic is exact to a message; a random one varies by its square root, bursts by more.
-    let chance = if Rate::are_even(rates) {
-        1.0
-    } else {
-        libm::sqrt(count as f64)
-    };
-    (count >= FEWEST).then(|| MeanRate {
-        hz: count as f64 / seconds,
-        doubt: (chance / seconds).max(spread(rates)),
-    })
-}
-
-/// Two rates that differ by more than the fraction `change`, and significantly.
-fn apart([first, second]: [Option<MeanRate>; 2], change: f64) -> Option<[MeanRate; 2]> {
-    let (first, second) = (first?, second?);
-    let noise = SIGMAS * libm::sqrt(first.doubt * first.doubt + second.doubt * second.doubt);
-    let apart = libm::fabs(second.hz - first.hz);
-    let is_apart = apart > change * first.hz.min(second.hz) && apart > noise;
-    is_apart.then_some([first, second])
-}
-
-/// The standard error of the mean rate, by how windows differ; 0 with fewer than two.
-fn spread(rates: &[Rate]) -> f64 {
-    let n = rates.len() as f64;
-    if rates.len() < 2 {
-        return 0.0;
-    }
-    let mean = rates.iter().map(Rate::hz).sum::<f64>() / n;
-    let squares = rates.iter().map(|r| (r.hz() - mean) * (r.hz() - mean));
-    libm::sqrt(squares.sum::<f64>() / (n - 1.0) / n)
 }
 
 /// The key of an event: its kind, the name it is about, and its number among the events of both, counted from 1.

@@ -261,7 +261,10 @@ pub(super) fn apart(
         "behind"
     };
     let (why, then) = match offset.messages {
-        0 => ("their first messages".to_owned(), "puts these together"),
+        0 => (
+            "their first messages".to_owned(),
+            "puts these together, if they are of one run",
+        ),
         many => (
             words::count(many, "message") + " that both recorded",
             "corrects it",
@@ -274,5 +277,9 @@ pub(super) fn apart(
     };
     let text =
         format!("the clock of `{own}` is {length} {side} that of `{other}` by {why}: {then}");
-    Notice::new(NoticeKind::Note, text)
+    let kind = match offset.messages {
+        0 => NoticeKind::Apart,
+        _ => NoticeKind::Note,
+    };
+    Notice::new(kind, text)
 }

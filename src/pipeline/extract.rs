@@ -82,12 +82,11 @@ pub fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
     };
     done.notices.extend(twice);
     let topics: Vec<&str> = done.topics.iter().map(TopicName::as_str).collect();
-    let unmatched = unmatched_topics(&job.topics, &topics);
-    if unmatched.is_empty() && done.rows == 0 {
+    done.notices.extend(unmatched_topics(&job.topics, &topics));
+    if done.rows == 0 {
         let text = "no message of these topics is in that time";
         done.notices.add(Notice::new(NoticeKind::Note, text));
     }
-    done.notices.extend(unmatched);
     Ok(done)
 }
 

@@ -162,9 +162,9 @@ pub fn check(job: &Check, watch: &mut dyn Watch) -> Result<Checked> {
     });
     if let Err(error) = &mission {
         // A service that finds no test report calls the job a success.
-        let (name, file) = (job.bags.join(" "), plain(&job.expect));
+        let text = unchecked(&job.bags.join(" "), &job.tracked, error);
         for report in job.reports.iter().filter(|r| r.format.word == "junit") {
-            put(&report.target, unchecked(&name, &file, error).as_bytes())?;
+            put(&report.target, text.as_bytes())?;
         }
     }
     let mission = mission?;
@@ -187,8 +187,8 @@ pub fn check(job: &Check, watch: &mut dyn Watch) -> Result<Checked> {
 pub struct Diff {
     /// The missions.
     pub readings: [Reading; 2],
-    /// The fraction by which a rate must differ, besides significantly.
-    pub rate_change: f64,
+    /// The fraction by which a rate must differ, besides significantly; `None` for what `baseline` allows.
+    pub rate_change: Option<f64>,
     /// The names of the missions.
     pub subject: DiffSubject,
     /// Pictures to write, of both missions.
@@ -210,7 +210,7 @@ impl Diff {
         Ok(Self {
             subject: subject(&readings),
             readings,
-            rate_change: RATE_CHANGE,
+            rate_change: None,
             reports: Vec::new(),
             pictures: Vec::new(),
             drawing,
@@ -286,8 +286,10 @@ pub fn diff(job: &Diff, watch: &mut dyn Watch) -> Result<Compared> {
     check_targets(&targets, &files(&job.readings))?;
     let [first, second] = &job.readings;
     let first = read(first, watch)?;
-    let second = read(second, watch)?;
-    let differences = differences(&first, &second, job.rate_change);
+    // Windows of equal length have comparable rates.
+    let second = read(&in_windows(second, Some(first.period)), watch)?;
+    let is_part = job.readings.iter().any(is_part);
+    let differences = differences(&first, &second, job.rate_change, is_part);
     for report in &job.reports {
         put(
             &report.target,
@@ -309,7 +311,7 @@ pub fn diff(job: &Diff, watch: &mut dyn Watch) -> Result<Compared> {
         let mut render = Render::new(Reading::default(), outputs)?;
         render.drawing = job.drawing.clone();
         let page = &mut render.drawing.page;
-        page.rate_change = job.rate_change;
+        page.rate_change = job.rate_change.unwrap_or(RATE_CHANGE);
         let DiffSubject {
             first: a,
             second: b,

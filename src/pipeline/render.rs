@@ -28,7 +28,7 @@ use crate::graph::window::default_period;
 use crate::layout::LayoutOptions;
 use crate::mission::Mission;
 use crate::mission::phases::knows_publishers;
-use crate::view::{Grouping, Mode, View, filtered, nothing, unmatched};
+use crate::view::{Grouping, Mode, View, check_filters, filtered, nothing, unmatched};
 
 /// The whole job of `bagreel render`.
 #[derive(Clone)]
@@ -120,6 +120,7 @@ pub(crate) fn check(job: &Render) -> Result<()> {
 /// # Errors
 /// As [`render`].
 pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
+    check_filters(&mission.elements, &job.drawing.view)?;
     let still = still(job, &mut mission);
     let outputs = still.map_or(&job.outputs[..], std::slice::from_ref);
     let has_grouped = outputs
@@ -320,7 +321,7 @@ impl<'a> Showing<'a> {
         };
         let (view, elements) = (&composed.view, &mission.elements);
         if is_drawn && view.items.is_empty() && elements.nodes.len() + elements.topics.len() > 0 {
-            return Err(nothing(elements, &composed.options));
+            return Err(nothing(elements));
         }
         let drawing = self.drawing.clone();
         let picture = is_drawn.then(|| composed.picture(&drawing));

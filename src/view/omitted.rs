@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::choose::{Reason, is_params, is_tf};
 use super::items::Viewed;
 use super::{Hide, NameFilter, ViewOptions};
-use crate::base::error::Error;
+use crate::base::error::{Error, Result};
 use crate::base::ids::grouped;
 use crate::base::name::{is_within, namespace};
 use crate::base::nearest::nearest;
@@ -91,29 +91,29 @@ fn names(elements: &Elements) -> [Vec<&str>; 2] {
 }
 
 /// The error of a view without any of these elements.
-pub(crate) fn nothing(elements: &Elements, options: &ViewOptions) -> Error {
-    let [nodes, topics] = names(elements);
-    let filters = [
-        ("--ns-filter", &options.ns_filter, &nodes),
-        ("--topic-filter", &options.topic_filter, &topics),
-    ];
-    let mut unfit = filters
-        .iter()
-        .filter_map(|(flag, filter, names)| none_pass(flag, filter, names));
-    if let Some(error) = unfit.next() {
-        return error;
-    }
-    let all = words::count(nodes.len() + topics.len(), "name");
+pub(crate) fn nothing(elements: &Elements) -> Error {
+    let all = words::count(elements.nodes.len() + elements.topics.len(), "name");
     Error::usage(
         format!("nothing is left to draw of {all}"),
         "show more with `--hide none` or wider filters",
     )
 }
 
+/// Checks that each filter of names matches an element.
+///
+/// # Errors
+/// [`Error::Usage`] for one that matches none.
+pub(crate) fn check_filters(elements: &Elements, options: &ViewOptions) -> Result<()> {
+    let [nodes, topics] = names(elements);
+    let unfit = none_pass("--ns-filter", &options.ns_filter, &nodes);
+    let unfit = unfit.or_else(|| none_pass("--topic-filter", &options.topic_filter, &topics));
+    unfit.map_or(Ok(()), Err)
+}
+
 /// The error of a filter that none of these names passes.
 pub(crate) fn none_pass(flag: &str, filter: &NameFilter, names: &[&str]) -> Option<Error> {
     let passes = |name: &&str| filter.passes(name);
-    let is_unfit = !filter.passes_all() && !names.iter().any(passes);
+    let is_unfit = !filter.passes_all() && !names.is_empty() && !names.iter().any(passes);
     is_unfit.then(|| {
         Error::usage(
             format!("`{flag}` matches none of {}", among(names.len())),
@@ -294,7 +294,9 @@ mod tests {
         };
         let mission = mission(&["/robot1/nav/planner>/robot1/plan /robot1/amcl</robot1/plan"]);
         assert!(outline(&mission, &options).items.is_empty(), "{filter}");
-        nothing(&mission.elements, &options).hint()
+        check_filters(&mission.elements, &options)
+            .unwrap_err()
+            .hint()
     }
 
     #[test]

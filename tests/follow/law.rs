@@ -205,11 +205,17 @@ fn following_a_healthy_run_prints_no_finding() {
         examples.join("warehouse.bag"),
         examples.join("courier.mcap"),
         shared.join("mini/mini_late.bag"),
+        shared.join("mini/mini_lz4.bag"),
+        shared.join("bags/example/example.bag"),
+        shared.join("bags/movebase/movebase_simtime.bag"),
+        shared.join("bags/paper/mcap1/mcap1_0.mcap"),
+        shared.join("bags/docker_mcap/test/test_0.mcap"),
         shared.join("mini/mini_bz2.bag"),
         shared.join("bags/mission/mission.bag"),
         shared.join("bags/paper/turtlesim.bag"),
         shared.join("bags/derived/mission_ros1_lz4.mcap"),
         shared.join("inspect/inspect.bag"),
+        shared.join("inspect/inspect_chosen.bag"),
     ];
     std::thread::scope(|scope| {
         for bag in bags.iter().filter(|bag| bag.exists()) {

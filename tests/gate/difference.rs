@@ -177,6 +177,7 @@ const FAULTS: &[Fault] = &[
     ("removed", |_, _| false),
     ("three messages", |n, _| n < 3),
     ("halved", |n, _| n % 2 == 0),
+    ("a fifth lost", |n, _| n % 5 != 0),
     ("late", |_, share| share > 0.3),
     ("gap", |_, share| !(0.4..0.6).contains(&share)),
     ("dies", |_, share| share < 0.6),
@@ -212,6 +213,33 @@ fn rhythms() -> Recording {
     all
 }
 
+/// The recording with a fault of this publisher that its messages do not show.
+fn graph_faults(number: usize) -> [(&'static str, Recording); 4] {
+    let changed = |fault: &'static str, change: &dyn Fn(&mut Recording)| {
+        let mut other = rhythms();
+        change(&mut other);
+        (fault, other)
+    };
+    [
+        changed("type changed", &|other| {
+            "std_msgs/Float64".clone_into(&mut other.publishers[number].type_name);
+        }),
+        changed("publisher swapped", &|other| {
+            other.publishers[number]
+                .node
+                .clone_from(&rhythms().publishers[0].node);
+        }),
+        changed("node renamed", &|other| {
+            "/other".clone_into(&mut other.publishers[number].node);
+        }),
+        changed("second publisher", &|other| {
+            let topic = other.publishers[number].topic.clone();
+            let intruder = other.publisher("/intruder", &topic, "std_msgs/String");
+            other.send(intruder, (2_000, 118_000), 400, b"\x05\0\0\0hello");
+        }),
+    ]
+}
+
 #[test]
 fn what_check_finds_with_a_baseline_of_a_run_diff_finds_too() {
     let dir = tempfile::tempdir().unwrap();
@@ -232,13 +260,16 @@ fn what_check_finds_with_a_baseline_of_a_run_diff_finds_too() {
         let own = healthy.messages.iter().filter(|m| m.0 == number);
         let times: Vec<i64> = own.map(|m| m.1).collect();
         let (first, life) = (times[0], (times[times.len() - 1] - times[0]) as f64);
-        for (fault, keeps) in FAULTS {
+        let sent = FAULTS.iter().map(|(fault, keeps)| {
             let mut other = rhythms();
             let mut nth = 0;
             other.messages.retain(|(of, time, _)| {
                 nth += usize::from(*of == number);
                 *of != number || keeps(nth - 1, (time - first) as f64 / life)
             });
+            (*fault, other)
+        });
+        for (fault, other) in sent.chain(graph_faults(number)) {
             bag(here, "b.bag", &other);
             let read = |args: &[&str]| -> serde_json::Value {
                 run(here, &[args, &["-o", "r.json"]].concat());
@@ -259,7 +290,9 @@ fn what_check_finds_with_a_baseline_of_a_run_diff_finds_too() {
                     .iter()
                     .any(|name| name.contains(topic) || name.contains(&publisher.node))
             };
-            if is_named(&found) && !is_named(&differs) {
+            // A new node stands for what it publishes.
+            let is_found = is_named(&differs) || differs.iter().any(|name| name == "/intruder");
+            if is_named(&found) && !is_found {
                 missed.push(format!("{topic} {fault}: {found:?}"));
             }
         }

@@ -262,6 +262,8 @@ fn reports_use_paths_in_the_repository() {
         ("github", "file="),
         ("gitlab", "\"path\": \""),
         ("sarif", "\"uri\": \""),
+        ("junit", "classname=\""),
+        ("markdown", "against `"),
     ];
     for (format, before) in forms {
         let plain = print(format, None);

@@ -97,7 +97,11 @@ def pictures_are_drawn():
 
 
 def errors_have_their_types():
-    raises(ValueError, "period", lambda: bagreel.tables(WAREHOUSE, period="often"))
+    raises(ValueError, 'period="often"', lambda: bagreel.tables(WAREHOUSE, period="often"))
+    raises(ValueError, 'align="noon"', lambda: bagreel.read(WAREHOUSE, align="noon"))
+    raises(TypeError, "ns=3", lambda: bagreel.read(WAREHOUSE, ns=3))
+    raises(bagreel.BagreelError, "'--period", lambda: bagreel.render(WAREHOUSE, "x.gif", period="often"))
+    assert dir(bagreel) == sorted(bagreel.__all__), dir(bagreel)
     raises(ValueError, "recordings", lambda: bagreel.tables(ROOT / "examples"))
     raises(bagreel.BagreelError, "no_such.bag", lambda: bagreel.read("no_such.bag"))
     raises(bagreel.BagreelError, "no_such.bag", lambda: bagreel.tables("no_such.bag"))

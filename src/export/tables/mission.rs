@@ -209,7 +209,7 @@ const CHANGES: &[Column<WindowChange>] = columns! {
 };
 
 const EVENTS: &[Column<EventId>] = columns! {
-    "entry" I64 |_, id| TableCell::count(id.0);
+    "id" I64 |_, id| TableCell::count(id.0);
     "kind" Text |all, id| TableCell::text(event(all, *id).kind.word());
     "what" Text |all, id| what(event(all, *id).what);
     "node" Text |all, id| node(all, event(all, *id).what);

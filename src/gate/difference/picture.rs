@@ -325,13 +325,11 @@ impl UnionLog<'_> {
         let node = self.elements.node(&difference.element).map(Element::Node);
         let topic = self.elements.topic(&difference.element).map(Element::Topic);
         let (kind, what) = match difference.kind {
-            "rate" => (Kind::Rate, topic),
+            "rate" if difference.rates.is_some() => (Kind::Rate, topic),
             "type" => (Kind::Type, topic),
             "qos" => (Kind::Qos, topic),
-            "event" | "time" | "begin" | "end" | "lifecycle" | "restarts" | "messages" => {
-                (Kind::Lifecycle, node.or(topic))
-            }
-            _ => return,
+            "node" | "topic" | "publishes" | "subscribes" => return,
+            _ => (Kind::Lifecycle, node.or(topic)),
         };
         if let (Some(what), true) = (what, difference.is_known) {
             self.add(kind, what, values(difference), None);
@@ -370,7 +368,6 @@ fn values(difference: &Difference) -> Detail {
     let event = difference.name.strip_prefix(&*difference.element);
     let of = |value: &str| match (difference.kind, value.parse::<usize>()) {
         ("restarts", Ok(n)) => words::count(n, "restart").into(),
-        ("messages", Ok(n)) => words::count(n, "message").into(),
         ("event", _) if value.is_empty() => "no such event".into(),
         ("begin", _) => format!("begins at {value}").into(),
         ("event" | "time", _) => format!("{} {value}", event.unwrap_or("").trim()).into(),

@@ -259,7 +259,7 @@ fn of_severity(check: &CheckedFact, severity: Severity) -> Vec<&Finding> {
 
 fn case(xml: &mut Xml, subject: &Subject<'_>, check: &CheckedFact) {
     xml.open("testcase")
-        .attribute("classname", &subject.file)
+        .attribute("classname", &subject.tracked)
         .attribute("name", &check.title)
         .attribute("time", 0);
     let [errors, warnings, unknown] = [Severity::Error, Severity::Warning, Severity::Unknown]
@@ -288,7 +288,7 @@ fn case(xml: &mut Xml, subject: &Subject<'_>, check: &CheckedFact) {
 
 fn details(subject: &Subject<'_>, findings: &[&Finding]) -> String {
     let line = |f: &&Finding| {
-        let place = format!("{}:{}", subject.file, f.place.line);
+        let place = format!("{}:{}", subject.tracked, f.place.line);
         let word = f.severity.word();
         format!("{word}[{}] {place}: {}", f.kind.word(), f.reported("; "))
     };

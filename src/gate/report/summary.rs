@@ -71,7 +71,7 @@ fn headline(subject: &Subject<'_>, verdict: &Verdict) -> String {
         "### {sign} Graph check: {} · {} against {} · {} in windows of {}",
         parts.join(", "),
         code(&subject.name()),
-        code(&subject.file),
+        code(&subject.tracked),
         words::duration(mission.span.nanos()),
         words::period(mission.period.nanos())
     )

@@ -276,7 +276,8 @@ fn shown(event: &Event) -> Stamp {
 }
 
 fn markdown(mission: &Mission, rows: &[LogRow<'_>]) -> String {
-    let mut all = "| when | what |\n|---:|---|\n".to_owned();
+    let heads = ["| when | what |\n|---:|---|\n", ""];
+    let mut all = heads[usize::from(rows.is_empty())].to_owned();
     let parts = mission.log.all_parts();
     for row in sorted(rows) {
         let (when, words) = when_and_what(mission, &parts, row);

@@ -1,6 +1,6 @@
 //! The explanation of an element: who sends and receives it, and when; then its evidence, each piece with its time and text.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use crate::base::error::{Error, Result};
@@ -11,7 +11,7 @@ use crate::base::words::{self, visible};
 use crate::evidence::EvidenceLine;
 use crate::graph::{Edge, Element};
 use crate::mission::Mission;
-use crate::mission::event_log::Kind;
+use crate::mission::event_log::{Event, Kind, LogFormat, LogRow, row_lines};
 
 /// The elements with all of `names` (one: a node or topic of that name; two: the edges between them), each with the answer
 /// and its kinds of evidence, then the `pieces` in order of time, the recorder's last. Plain text, a line each; repeated
@@ -89,30 +89,24 @@ fn elements(mission: &Mission, names: &[String]) -> Vec<(Element, String)> {
     let all = &mission.elements;
     let node = |edge: &Edge| all.nodes[edge.node].name.as_str();
     let topic = |edge: &Edge| all.topics[edge.topic].name.as_str();
-    let mut found = Vec::new();
     if let [name] = names {
-        let nodes = all
-            .nodes
-            .with_ids()
-            .filter(|(_, n)| n.name.as_str() == name);
-        found.extend(nodes.map(|(id, n)| (Element::Node(id), format!("node {}", n.name))));
-        let topics = all
-            .topics
-            .with_ids()
-            .filter(|(_, t)| t.name.as_str() == name);
-        found.extend(topics.map(|(id, t)| (Element::Topic(id), format!("topic {}", t.name))));
-        return found;
+        let node = all.node(name).map(|id| (Element::Node(id), "node"));
+        let topic = all.topic(name).map(|id| (Element::Topic(id), "topic"));
+        let found = node.into_iter().chain(topic);
+        return found
+            .map(|(what, word)| (what, format!("{word} {name}")))
+            .collect();
     }
     let is_asked = |edge: &&Edge| names.iter().all(|n| n == node(edge) || n == topic(edge));
     let edges = all.edges().filter(|(_, e)| is_asked(e));
-    found.extend(edges.map(|(what, e)| {
+    let titled = edges.map(|(what, e)| {
         let verb = match what {
             Element::Publish(_) => "publishes",
             _ => "subscribes to",
         };
         (what, format!("{} {verb} {}", node(e), topic(e)))
-    }));
-    found
+    });
+    titled.collect()
 }
 
 fn describe(
@@ -142,7 +136,7 @@ const LOGS: usize = 3;
 /// The time before an end of a node, and after it, in which its warnings may explain it.
 const LOGGED_NS: (i64, i64) = (60_000_000_000, 5_000_000_000);
 
-/// Who publishes and receives a topic, and when; when a node ran, its topics, and its last warnings before each of its ends.
+/// Who publishes and receives a topic, and when; when a node ran, and its topics; then what happened.
 fn answer(mission: &Mission, element: Element, pieces: &[EvidenceLine]) -> Vec<String> {
     let all = &mission.elements;
     let peers = |publishes: bool, of: &dyn Fn(&Edge) -> bool, name: &dyn Fn(&Edge) -> String| {
@@ -151,19 +145,16 @@ fn answer(mission: &Mission, element: Element, pieces: &[EvidenceLine]) -> Vec<S
             of(edge) && is_shown && matches!(what, Element::Publish(_)) == publishes
         });
         let named = edges.map(|(what, edge)| {
-            let lives = &all.seen(what).lives;
+            let start = all.seen(what).lives.first().map(|life| life.start);
             let text = format!("{} {}", name(edge), when(mission, what));
-            (
-                lives.first().map(|life| life.start),
-                text.trim_end().to_owned(),
-            )
+            (start, text.trim_end().to_owned())
         });
         let mut named: Vec<_> = named.collect();
         named.sort();
         let named: Vec<String> = named.into_iter().map(|(_, text)| text).collect();
         (!named.is_empty()).then(|| words::some_of(&named, NAMES))
     };
-    match element {
+    let mut lines = match element {
         Element::Topic(id) => {
             let node = |edge: &Edge| all.nodes[edge.node].name.to_string();
             let of = |edge: &Edge| edge.topic == id;
@@ -171,17 +162,12 @@ fn answer(mission: &Mission, element: Element, pieces: &[EvidenceLine]) -> Vec<S
             let unnamed = unnamed.map(|n| words::count(n as usize, "unnamed node"));
             let senders = [peers(true, &of, &node), unnamed].into_iter().flatten();
             let senders: Vec<String> = senders.collect();
+            let senders = (!senders.is_empty()).then(|| senders.join(", and by "));
             let receivers = peers(false, &of, &node);
-            let or = |known: String| {
-                if known.is_empty() {
-                    "no known node".to_owned()
-                } else {
-                    known
-                }
-            };
+            let or = |known: Option<String>| known.unwrap_or_else(|| "no known node".to_owned());
             vec![
-                format!("published by {}", or(senders.join(", and by "))),
-                format!("received by {}", or(receivers.unwrap_or_default())),
+                format!("published by {}", or(senders)),
+                format!("received by {}", or(receivers)),
             ]
         }
         Element::Node(id) => {
@@ -194,22 +180,38 @@ fn answer(mission: &Mission, element: Element, pieces: &[EvidenceLine]) -> Vec<S
                 });
             let mut lines = vec![format!("ran {}", when(mission, element))];
             lines.extend(listed.into_iter().flatten());
-            let own = mission.log.events.iter().filter(|e| e.what == element);
-            let ends = own.filter(|e| matches!(e.kind, Kind::Stopped | Kind::Restarted));
-            for end in ends {
-                let at = words::offset_tenths(mission.offset(end.time));
-                lines.push(format!("{} at {at}", end.kind.word()));
-                lines.extend(logged(
-                    mission,
-                    all.nodes[id].name.as_str(),
-                    end.time,
-                    pieces,
-                ));
-            }
             lines
         }
         edge => vec![when(mission, edge)],
+    };
+    lines.extend(happened(mission, element, pieces));
+    lines
+}
+
+/// The changes of an element and of its connections as lines of the log, those of which they are a part instead of them, and the last
+/// warnings of a node before each of its ends.
+fn happened(mission: &Mission, element: Element, pieces: &[EvidenceLine]) -> Vec<String> {
+    let (elements, events) = (&mission.elements, &mission.log.events);
+    let is_own = |event: &Event| {
+        let (node, topic) = elements.ends(event.what);
+        let (node, topic) = (node.map(Element::Node), topic.map(Element::Topic));
+        let is_end = event.part_of.is_none() && [node, topic].contains(&Some(element));
+        (event.what == element || is_end) && !event.quiet
+    };
+    let mut lines = Vec::new();
+    let mut shown = BTreeSet::new();
+    for (id, event) in events.with_ids().filter(|(_, event)| is_own(event)) {
+        let head = event.part_of.unwrap_or(id);
+        if let Some(whole) = events.get(head).filter(|_| shown.insert(head)) {
+            let rows = row_lines(mission, &[LogRow::Event(head, whole)], LogFormat::Text);
+            lines.extend(rows.iter().map(|row| row.text(None).trim_end().to_owned()));
+        }
+        if let (Element::Node(id), Kind::Stopped | Kind::Restarted) = (event.what, event.kind) {
+            let name = elements.nodes[id].name.as_str();
+            lines.extend(logged(mission, name, event.time, pieces));
+        }
     }
+    lines
 }
 
 /// When an element existed: `00:38–02:56`, `04:59–` to the end, `throughout`.
@@ -234,13 +236,15 @@ fn when(mission: &Mission, what: Element) -> String {
     words::some_of(&lives.collect::<Vec<String>>(), TIMES)
 }
 
-/// The last warnings and errors that a node logged before an end.
+/// The last warnings and errors that a node logged before an end; if it logs, and none of them, a line that says so.
 fn logged(mission: &Mission, name: &str, end: Stamp, pieces: &[EvidenceLine]) -> Vec<String> {
+    let mut logs = false;
     let own = pieces.iter().filter_map(|piece| {
         let (logger, text) = piece.text.split_once(" logs ")?;
         let is_own = logger
             .strip_prefix(name)
             .is_some_and(|part| part.is_empty() || part.starts_with('/'));
+        logs |= is_own;
         let time = piece
             .time
             .filter(|time| (-LOGGED_NS.0..=LOGGED_NS.1).contains(&time.since(end)))?;
@@ -248,10 +252,13 @@ fn logged(mission: &Mission, name: &str, end: Stamp, pieces: &[EvidenceLine]) ->
             .iter()
             .any(|word| text.starts_with(word));
         let at = words::offset_tenths(mission.offset(time));
-        (is_own && is_warning).then(|| format!("  {at} {text}"))
+        (is_own && is_warning).then(|| format!("{at:>13}    {text}"))
     });
     let mut own: Vec<String> = own.collect();
     own.dedup();
+    if logs && own.is_empty() {
+        return vec![format!("{:17}no warning or error in the minute before", "")];
+    }
     own.split_off(own.len().saturating_sub(LOGS))
 }
 

@@ -253,7 +253,6 @@ pub(crate) fn interruptions(rows: &[InterruptionRow<'_>]) -> Vec<Interruption> {
 #[derive(Serialize)]
 pub(crate) struct ChangeRow<'a> {
     kind: &'static str,
-    #[serde(rename = "entry")]
     event: EventId,
     #[serde(flatten)]
     named: ElementName<'a>,

@@ -3,12 +3,14 @@
 use super::{Extract, Extracted, stop};
 use crate::bag::Want;
 use crate::base::error::{Error, Result};
+use crate::base::name::TopicName;
 use crate::base::table::{Batch, ColumnKind, TableCell, TableColumn};
 use crate::evidence::times::Timed;
 use crate::export::sink::OutputSink;
 use crate::export::tables::writer::begin;
 use crate::pipeline::Watch;
 use crate::pipeline::times::{MessageTimes, Sender};
+use crate::view::none_pass;
 
 /// The number of rows buffered before they are written.
 const MOST_ROWS: usize = 16 * 1024;
@@ -23,6 +25,10 @@ pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted>
         stop(watch)?;
     }
     times.finish()?;
+    let topics: Vec<&str> = times.topics.iter().map(TopicName::as_str).collect();
+    if let Some(error) = none_pass("--topic-filter", &job.topics, &topics) {
+        return Err(error);
+    }
     Ok(Extracted {
         tables: 1,
         rows: write(job, &times, sink, watch)?,

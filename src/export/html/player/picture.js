@@ -106,7 +106,7 @@ function seek(w, quiet) {
 const rangeTimes = () => `${clock(starts[range[0]])} – ${clock(ends[range[1]])}`;
 function header() {
 	const place = `window ${now + 1} of ${W}`, counts = countsOf();
-	if (range) setText('where', `windows ${range[0] + 1} to ${range[1] + 1} of ${W} · ${rangeTimes()} of ${clock(total)} · mean rates`);
+	if (range) setText('where', `windows ${range[0] + 1} to ${range[1] + 1} of ${W} · ${rangeTimes()} of ${clock(total)} · rates over the range`);
 	else setText('where', data.sides?.[now] ?? `${place} · ${clock(starts[now])} – ${clock(ends[now])} of ${clock(total)}${base < 0 ? '' : ` · compared with window ${base + 1}, ${clock(starts[base])} – ${clock(ends[base])}`}`);
 	$.clock.firstChild.textContent = iso(data.epoch / 1e3 + starts[now], 11, 19) + ' ';
 	const p = phases.findLastIndex(([from]) => from < ends[now]);

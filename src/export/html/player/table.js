@@ -56,7 +56,7 @@ function fillTable() {
 	});
 	const [head, body] = $.sheet.querySelectorAll('thead, tbody');
 	head.replaceChildren(make('tr', {}, ...COLUMNS.map(([title], k) => {
-		const button = make('button', { textContent: k == 3 ? (base < 0 ? 'Since previous' : `Since window ${base + 1}`) : k == 2 ? range ? 'Mean rate' : 'Rate now' : title, onclick: () => { upward = sortBy == k ? !upward : k < 2 || k > 4; sortBy = k; fillTable(); $.sheet.querySelectorAll('thead button')[k].focus(); } });
+		const button = make('button', { textContent: k == 3 ? (base < 0 ? 'Since previous' : `Since window ${base + 1}`) : k == 2 ? range ? 'Rate over the range' : 'Rate now' : title, onclick: () => { upward = sortBy == k ? !upward : k < 2 || k > 4; sortBy = k; fillTable(); $.sheet.querySelectorAll('thead button')[k].focus(); } });
 		const cell = make('th', { scope: 'col' }, button);
 		cell.ariaSort = sortBy == k ? (upward ? 'ascending' : 'descending') : 'none';
 		return cell;
