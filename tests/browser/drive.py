@@ -90,7 +90,7 @@ def compare_data(page, evolution):
             ends = graph["arrows"][i - count][:2] if i >= count else []
             grouped = any("together" in facts[e] for e in [i, *ends])
             # A node that is away stays, with its topics.
-            away = words[0] == "silent" and any(graph["names"][e] in restarted for e in {i, *ends, *near[i]} if e < count)
+            away = words[0] == "silent" and any(graph["names"][e] in restarted for k in {i, *ends} for e in {k, *near[k]} if e < count)
             assert i in there or grouped or words == ["off"] or "removed" in words or away, (w, i, words)
     assert compared > 1000, compared
     print(f"  {compared} values of the data equal the evolution's")
