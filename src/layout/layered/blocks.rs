@@ -250,6 +250,17 @@ impl Cut {
     ) -> Option<u64> {
         let mut turns = 0;
         let mut map = Map::new(&[&placed.boxes, words].concat());
+        // The ports of lines inside of a namespace, on each side of its boxes.
+        let mut taken: BTreeMap<(usize, bool), Vec<f64>> = BTreeMap::new();
+        let inside = (0..part.ends.len()).filter(|link| self.between.binary_search(link).is_err());
+        for (route, (from, to)) in inside.map(|link| (&placed.routes[link], part.ends[link])) {
+            let end = route.points().next_back().unwrap_or(route.start);
+            for (v, port) in [(from, route.start), (to, end)] {
+                let centre = placed.boxes[v].centre();
+                let ports = taken.entry((v, port.x > centre.x)).or_default();
+                ports.push(port.y - centre.y);
+            }
+        }
         for is_end in [true, false] {
             let mut sides: BTreeMap<(usize, bool), Vec<usize>> = BTreeMap::new();
             for &link in &self.between {
@@ -261,7 +272,7 @@ impl Cut {
                     sides.entry((v, is_after)).or_default().push(link);
                 }
             }
-            for ((v, _), mut links) in sides {
+            for ((v, is_after), mut links) in sides {
                 let y = |link: &usize| placed.routes[*link].start.y;
                 links.sort_by(|a, b| y(a).total_cmp(&y(b)).then(a.cmp(b)));
                 let end = End {
@@ -269,10 +280,9 @@ impl Cut {
                     rect: placed.boxes[v],
                     outline: plan.vertices[part.vertices[v]].outline,
                 };
-                let many = links.len() as f64;
-                let step = PORT_STEP.min(PORTS * end.rect.h / many);
-                for (nth, link) in links.into_iter().enumerate() {
-                    let aside = (nth as f64 - (many - 1.0) / 2.0) * step;
+                let taken = taken.get(&(v, is_after)).map_or(&[][..], Vec::as_slice);
+                let ports = ports(links.len(), taken, end.rect.h * PORTS);
+                for (link, aside) in links.into_iter().zip(ports) {
                     let (route, is_level) = map.led_on(&placed.routes[link], end, aside)?;
                     placed.routes[link] = route;
                     turns += u64::from(!is_level);
@@ -281,6 +291,21 @@ impl Cut {
         }
         Some(turns)
     }
+}
+
+/// The distances of new ports from the middle of a side, on the part of it for ports, which is `long`: side by side, as close
+/// to the middle as those that are `taken` allow.
+fn ports(many: usize, taken: &[f64], long: f64) -> Vec<f64> {
+    let step = PORT_STEP.min(long / (many + taken.len()) as f64);
+    let ports = |by: f64| {
+        let nth = (0..many).map(|nth| nth as f64 - (many as f64 - 1.0) / 2.0);
+        nth.map(move |nth| by + nth * step)
+    };
+    let is_apart = |at: f64| taken.iter().all(|port| (port - at).abs() >= step);
+    let is_free = |by: &f64| ports(*by).all(|at| at.abs() <= long / 2.0 && is_apart(at));
+    let shifts = (0..40_u32).map(|by| f64::from(by) * step / 4.0);
+    let by = shifts.flat_map(|by| [by, -by]).find(is_free);
+    ports(by.unwrap_or(0.0)).collect()
 }
 
 /// A route in straight pieces, and its bounds.
