@@ -172,12 +172,8 @@ impl<'a> TopicTimeline<'a> {
             } else {
                 row.rates()
             };
-            let color = if rate.is_some() {
-                ink::TEXT
-            } else {
-                ink::QUIET
-            };
-            let text = rate.as_deref().unwrap_or("–");
+            let rate = rate.as_deref().map(|rate| (rate, ink::TEXT));
+            let (text, color) = rate.unwrap_or(("–", ink::QUIET));
             self.drawer.rate(&mut canvas, self.drawer.y(k), text, color);
         }
         canvas.begin("nodes");

@@ -255,12 +255,8 @@ impl Drawer {
     /// The y at which the rows begin.
     fn begin(&self) -> f64 {
         let has_band = !self.timeline.phases.is_empty();
-        self.top
-            + if has_band {
-                BAND.0 + self.gap(BAND.1)
-            } else {
-                0.0
-            }
+        let band = BAND.0 + self.gap(BAND.1);
+        self.top + if has_band { band } else { 0.0 }
     }
 
     /// The y at which the rows end, at the axis.
@@ -338,11 +334,8 @@ impl Drawer {
         if let Some(right) = self.rates.filter(|_| is_paper) {
             canvas.text_end(right, head, small, quiet, "Hz");
         }
-        let is_of_nodes = self
-            .timeline
-            .rows
-            .iter()
-            .any(|row| !row.beside[0].is_empty());
+        let mut rows = self.timeline.rows.iter();
+        let is_of_nodes = rows.any(|row| !row.beside[0].is_empty());
         if let Some((x, _)) = self.beside.filter(|_| is_of_nodes) {
             let text = "→ publishes  ← subscribes, as far as known";
             canvas.text(x, head, small, quiet, text);

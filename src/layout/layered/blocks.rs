@@ -293,19 +293,30 @@ impl Cut {
     }
 }
 
-/// The distances of new ports from the middle of a side, on the part of it for ports, which is `long`: side by side, as close
-/// to the middle as those that are `taken` allow.
+/// The distances of new ports from the middle of a side, on the part of it for ports, which is `long`: side by side, or where
+/// those that are `taken` are in the way, the places closest to the middle.
 fn ports(many: usize, taken: &[f64], long: f64) -> Vec<f64> {
     let step = PORT_STEP.min(long / (many + taken.len()) as f64);
-    let ports = |by: f64| {
-        let nth = (0..many).map(|nth| nth as f64 - (many as f64 - 1.0) / 2.0);
-        nth.map(move |nth| by + nth * step)
-    };
-    let is_apart = |at: f64| taken.iter().all(|port| (port - at).abs() >= step);
-    let is_free = |by: &f64| ports(*by).all(|at| at.abs() <= long / 2.0 && is_apart(at));
-    let shifts = (0..40_u32).map(|by| f64::from(by) * step / 4.0);
-    let by = shifts.flat_map(|by| [by, -by]).find(is_free);
-    ports(by.unwrap_or(0.0)).collect()
+    let beside = (0..many).map(|nth| (nth as f64 - (many as f64 - 1.0) / 2.0) * step);
+    let is_free = |all: &[f64], at: f64| all.iter().all(|port| (port - at).abs() >= step);
+    let is_clear = beside.clone().all(|at| is_free(taken, at));
+    let near = (0..40_u32).map(|nth| f64::from(nth) * step / 4.0);
+    let near = near
+        .flat_map(|at| [at, -at])
+        .filter(|at| at.abs() <= long / 2.0 && !is_clear);
+    let mut all = taken.to_vec();
+    for at in near {
+        if all.len() < many + taken.len() && is_free(&all, at) {
+            all.push(at);
+        }
+    }
+    let mut ports = all.split_off(taken.len());
+    ports.sort_by(f64::total_cmp);
+    if ports.len() == many {
+        ports
+    } else {
+        beside.collect()
+    }
 }
 
 /// A route in straight pieces, and its bounds.
