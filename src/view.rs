@@ -218,7 +218,7 @@ pub enum ArrowKind {
     Publish,
     /// From a topic to a node that subscribes to it.
     Subscribe,
-    /// From a node to a node over this topic ([`Mode::Nodes`] in graph files).
+    /// From a node to a node over this topic or action ([`Mode::Nodes`] in graph files).
     Direct(Arc<str>),
     /// Between two boxes, over all topics between them in both directions ([`Mode::Nodes`] in pictures).
     Bundle,
@@ -354,17 +354,6 @@ pub struct View {
 }
 
 impl View {
-    /// The beginning of window `k` as a part of the time from the first window's start to the last's end, 0..=1; 1
-    /// after the last.
-    pub(crate) fn place_in_time(&self, k: usize) -> f64 {
-        let (Some(first), Some(last)) = (self.frames.first(), self.frames.last()) else {
-            return 0.0;
-        };
-        let whole = last.span.end.since(first.span.start).max(1) as f64;
-        let at = self.frames.get(k).map_or(last.span.end, |f| f.span.start);
-        at.since(first.span.start) as f64 / whole
-    }
-
     /// The namespaces with a box around an item, the innermost first.
     pub(crate) fn around(&self, item: ItemId) -> impl Iterator<Item = usize> + '_ {
         let first = self.items.get(item).and_then(|item| item.cluster);

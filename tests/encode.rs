@@ -120,6 +120,7 @@ fn run(
         view: &view,
         picture: &Discs,
         unfolded: None,
+        paired: None,
         painter: &Painter::new(&fonts),
         fonts: &fonts,
         latex: None,

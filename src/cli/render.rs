@@ -312,7 +312,7 @@ fn view(args: &ViewArgs) -> Result<ViewOptions> {
     };
     match args.mode {
         Some(ModeWord::Nodes) => view.mode = Mode::Nodes,
-        Some(ModeWord::All) => view.mode = Mode::All,
+        Some(ModeWord::All) => (view.mode, view.keeps_topics) = (Mode::All, true),
         Some(ModeWord::Topics) | None => {}
     }
     if let Some(filter) = &args.ns_filter {

@@ -6,7 +6,7 @@ mod badge;
 mod boxes;
 mod card;
 mod texts;
-pub(crate) use texts::change_counts;
+pub(crate) use texts::{change_counts, short_name};
 mod gates;
 mod ids;
 mod legend;
@@ -357,9 +357,8 @@ impl<'a> Picture<'a> {
             let member_list = (!space.replicas.is_empty())
                 .then(|| member_lists.next())
                 .flatten();
-            let now = view.place_in_time(frame.index);
-            let member_list = member_list
-                .map(|who| pen.member_list(space, *place, self.shifts[at], &id, now, who));
+            let member_list =
+                member_list.map(|who| pen.member_list(space, *place, self.shifts[at], &id, who));
             let empty = (!full[at]).then(|| {
                 if self.measured.graph.first_seen[at] > frame.index {
                     "not on yet"
@@ -401,7 +400,7 @@ impl<'a> Picture<'a> {
             let all = std::iter::once(drawn).chain(rows);
             if spotlight
                 .as_ref()
-                .is_none_or(|spot| spot.has_box(shown.item()))
+                .is_none_or(|spot| spot.lit.contains(&shown.item()))
             {
                 groups.extend(all);
             } else {

@@ -276,59 +276,28 @@ impl<'a> StripSource<'a> {
 
     /// Draws the shared legend from `y` on; returns its height.
     fn legend(&self, page: &PanelGrid, y: f64, groups: &mut Vec<Group>) -> f64 {
-        // Drawn on a page so small that its legend has the smallest type, then enlarged to the size of
-        // captions.
-        let small = Size::new(page.width, 300.0);
-        let size_on = |size: Size| {
-            let options = PageOptions {
-                size,
-                ..PageOptions::default()
-            };
-            let picture = Measured::new(self.view, self.style, self.fonts, options);
-            let scene = picture.with(self.picture.layout().clone()).scene(0);
-            scene.groups.into_iter().find(|g| g.id == "legend")
+        let options = PageOptions {
+            size: Size::new(page.width, 300.0),
+            unit: Some(page.caption / self.style.legend.size),
+            ..PageOptions::default()
         };
-        let text_of = |group: &Group| {
-            group.pieces.iter().find_map(|p| match p {
-                Piece::Text(text) => Some(text.size),
-                Piece::Shape(_) => None,
-            })
-        };
-        let Some(size) = size_on(small).as_ref().and_then(text_of) else {
+        let picture = Measured::new(self.view, self.style, self.fonts, options);
+        let scene = picture.with(self.picture.layout().clone()).scene(0);
+        let legend = scene.groups.into_iter().find(|g| g.id == "legend");
+        let ground = legend
+            .as_ref()
+            .and_then(|legend| match legend.pieces.first()? {
+                Piece::Shape(Shape {
+                    form: Form::Rect(place, _),
+                    ..
+                }) => Some(*place),
+                _ => None,
+            });
+        let (Some(legend), Some(place)) = (legend, ground) else {
             return GAP;
         };
-        let by = page.caption / size.max(0.1);
-        let Some(legend) = size_on(Size::new(page.width / by, 300.0)) else {
-            return GAP;
-        };
-        let bounds = legend
-            .pieces
-            .iter()
-            .filter_map(piece_bounds)
-            .reduce(|a, b| a.union(&b));
-        let Some(bounds) = bounds else { return GAP };
-        groups.push(legend.placed(by, Point::new(0.0, y - bounds.y * by)));
-        bounds.h * by + GAP
-    }
-}
-
-/// The upright box around a piece; for a text only its height and beginning.
-fn piece_bounds(piece: &Piece) -> Option<Rect> {
-    match piece {
-        Piece::Shape(shape) => match &shape.form {
-            Form::Rect(rect, _) | Form::Ellipse(rect) => Some(*rect),
-            Form::Path(steps) => Rect::of_points(
-                steps
-                    .iter()
-                    .filter_map(|step| step.points().last().copied()),
-            ),
-        },
-        Piece::Text(text) => Some(Rect::new(
-            text.at.x,
-            text.at.y - text.size,
-            0.0,
-            text.size * 1.3,
-        )),
+        groups.push(legend.placed(1.0, Point::new(0.0, y - place.y)));
+        place.h + GAP
     }
 }
 

@@ -9,13 +9,13 @@ use crate::base::words;
 use crate::draw::picture::PageOptions;
 use crate::draw::picture::page::{PageFrame, Strip, unit};
 use crate::draw::picture::title::Title;
-use crate::draw::scene::{Scene, Stroke};
-use crate::draw::style::{Color, Style};
+use crate::draw::scene::Scene;
+use crate::draw::style::Style;
 use crate::draw::text::Fonts;
 use crate::draw::timeline::Timeline;
-use crate::draw::timeline::arranged::{by_namespace, together};
-use crate::draw::timeline::canvas::{HAIRLINE, PaperCanvas, Sizes, Type, ink};
-use crate::draw::timeline::drawer::{Density, Drawer};
+use crate::draw::timeline::arranged::{by_namespace, numbered, together};
+use crate::draw::timeline::canvas::{PaperCanvas, Sizes, Type, ink};
+use crate::draw::timeline::drawer::{Density, Drawer, fitting};
 use crate::draw::timeline::rows::{Row, of_topics};
 use crate::draw::timeline::source::FigureSource;
 
@@ -31,7 +31,7 @@ const NARROW: f64 = 960.0;
 const LARGEST: Size = Size::new(1920.0, 1080.0);
 /// The height below the rows in millimetres, for nodes and for the line that explains why this is not a graph.
 const BELOW: f64 = 9.0;
-/// The height of a node in millimetres.
+/// The height of the line of nodes in millimetres.
 const LABEL: f64 = 3.5;
 
 /// A topic timeline ready to be drawn, one scene per window.
@@ -49,15 +49,11 @@ pub(crate) struct TopicTimeline<'a> {
     topics: usize,
 }
 
-/// The whole timeline in one drawing, and the position of the playhead in each window.
+/// The whole timeline in one drawing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Overview {
     /// The timeline with all messages, without a playhead.
     pub scene: Scene,
-    /// The playhead in pixels, per window.
-    pub heads: Vec<Rect>,
-    /// The colour of the playhead.
-    pub color: Color,
     /// The title of the picture.
     pub title: String,
 }
@@ -76,6 +72,7 @@ impl<'a> TopicTimeline<'a> {
     ) -> Self {
         let rows: Vec<Row> = of_topics(source).into_iter().map(Row::plain).collect();
         let (topics, pitch) = (rows.len(), Sizes::SCREEN.pitch());
+        let rows = numbered(rows, source.span());
         let each = |is_folded| by_namespace(rows.clone(), source.span(), is_folded);
         let mut timeline = Timeline::named(source, each(false));
         let others = timeline.height(Sizes::SCREEN, 0.0) + BELOW;
@@ -139,15 +136,11 @@ impl<'a> TopicTimeline<'a> {
         let length = words::duration(whole.span.nanos());
         whole.messages = self.source.mission.messages;
         whole.note = format!("{} over {length}", words::count(self.topics, "topic"));
-        let heads = self.view.frames.iter();
-        let heads = heads.map(|f| self.drawer.window(f.span).scaled(self.scale));
         Overview {
             scene: Scene {
                 title: format!("Topics over time of {}", self.options.title()),
                 ..self.page(&whole, "", false)
             },
-            heads: heads.collect(),
-            color: self.style.timeline.head,
             title: self.options.title().to_owned(),
         }
     }
@@ -177,14 +170,10 @@ impl<'a> TopicTimeline<'a> {
             let rate = if is_window {
                 count(row).map(|count| words::rate_of(count, seconds))
             } else {
-                row.hz.map(words::rate)
+                row.rates()
             };
-            let color = if rate.is_some() {
-                ink::TEXT
-            } else {
-                ink::QUIET
-            };
-            let text = rate.as_deref().unwrap_or("–");
+            let rate = rate.as_deref().map(|rate| (rate, ink::TEXT));
+            let (text, color) = rate.unwrap_or(("–", ink::QUIET));
             self.drawer.rate(&mut canvas, self.drawer.y(k), text, color);
         }
         canvas.begin("nodes");
@@ -193,7 +182,10 @@ impl<'a> TopicTimeline<'a> {
         self.nodes(&mut canvas, &|id| !is_window || alive.contains(id));
         canvas.begin("why");
         let wide = self.options.size.w / self.scale - 2.0 * self.drawer.left;
-        let why = canvas.cut(&self.why(), Type::Small, wide);
+        let why = self.why();
+        let signs = format!("{why}. Tick: first message; cross: last; frame: this window.");
+        let fits = canvas.width(&signs, Type::Small) <= wide;
+        let why = canvas.cut(if fits { &signs } else { why }, Type::Small, wide);
         let y = end + LABEL + 1.6 + Sizes::SCREEN.line() / 2.0;
         canvas.text(self.drawer.left, y, Type::Small, ink::QUIET, &why);
         let mut groups = Vec::new();
@@ -215,52 +207,32 @@ impl<'a> TopicTimeline<'a> {
     }
 
     /// The reason why this is not a graph, and how to get one.
-    fn why(&self) -> String {
-        let elements = &self.source.mission.elements;
-        let why = if self.source.knows_publishers() {
-            "a timeline of topics; --mode all draws the graph".to_owned()
-        } else if elements.publishes.is_empty() {
-            "the bag names no publishers; add them with --topology FILE; bagreel info says how to record them".to_owned()
+    fn why(&self) -> &'static str {
+        if self.source.knows_publishers() {
+            "a timeline of topics; --mode all draws the graph"
+        } else if self.source.mission.elements.publishes.is_empty() {
+            "the bag names no publishers; add them with --topology FILE; bagreel info says how to record them"
         } else {
-            "most publishers are unknown; add them with --topology FILE, or draw what is known with --mode all".to_owned()
-        };
-        format!("{why}. Tick: first message; cross: last; frame: this window.")
+            "most publishers are unknown; add them with --topology FILE, or draw what is known with --mode all"
+        }
     }
 
-    /// Draws as many of the known nodes as fit, as labels in a row; those that are in the window emphasized.
+    /// Writes as many of the known nodes as fit; those that are in the window, if it is one.
     fn nodes(&self, canvas: &mut PaperCanvas<'_>, is_there: &dyn Fn(&NodeId) -> bool) {
         let elements = &self.source.mission.elements;
-        let is_known = |id: &NodeId| {
-            let node = elements.nodes.get(*id);
-            node.is_some_and(|n| !n.seen.evidence.is_guess())
-        };
+        let is_known = |id: &NodeId| !elements.seen(Element::Node(*id)).evidence.is_guess();
+        let is_shown = |id: &NodeId| is_known(id) && is_there(id);
         let roles = self.source.roles.iter();
-        let all: Vec<_> = roles.filter(|(_, n)| n.iter().any(is_known)).collect();
-        let y = self.drawer.end() + Sizes::SCREEN.line() + 2.0 + LABEL / 2.0;
-        if !all.is_empty() {
-            let left = self.drawer.left;
+        let roles = roles.filter(|(_, nodes)| nodes.iter().any(is_shown));
+        let names: Vec<String> = roles.map(|(role, _)| role.to_string()).collect();
+        let (left, x) = (self.drawer.left, self.drawer.axis.left);
+        let room = self.options.size.w / self.scale - left - x;
+        let fits = |text: &str| canvas.width(text, Type::Small) <= room;
+        let text = fitting(&names, names.len(), fits);
+        if !names.is_empty() {
+            let y = self.drawer.end() + Sizes::SCREEN.line() + 2.0 + LABEL / 2.0;
             canvas.text(left, y, Type::Small, ink::QUIET, "nodes known");
-        }
-        let mut x = self.drawer.axis.left;
-        let end = self.options.size.w / self.scale - self.drawer.left;
-        for (k, (role, nodes)) in all.iter().enumerate() {
-            let wide = canvas.width(role, Type::Small) + 2.4;
-            let rest = if k + 1 < all.len() { 8.0 } else { 0.0 };
-            if x + wide + rest > end {
-                let more = format!("+{}", all.len() - k);
-                canvas.text(x, y, Type::Small, ink::QUIET, &more);
-                return;
-            }
-            let (fill, color) = if nodes.iter().any(is_there) {
-                (ink::BAND[1], ink::TEXT)
-            } else {
-                (ink::PAPER, ink::QUIET)
-            };
-            let place = Rect::new(x, y - LABEL / 2.0, wide, LABEL);
-            let line = Stroke::solid(ink::RULE, HAIRLINE);
-            canvas.frame(place, LABEL / 2.0, fill, &line);
-            canvas.text(x + 1.2, y, Type::Small, color, role);
-            x += wide + 1.4;
+            canvas.text(x, y, Type::Small, ink::TEXT, &text);
         }
     }
 }

@@ -175,30 +175,25 @@ pub(crate) fn one_text<'a>(
 }
 
 /// Writes a text per window if the name contains `{n}`; otherwise one of the only window, or of the union of all.
-/// `text` takes the index of the window if there are several.
 pub(crate) fn text_per_window(
     view: &View,
     target: &Target,
-    text: impl Fn(&SeenWindow, Option<usize>) -> String,
-    remark: impl Fn(&Target, &SeenWindow, &str) -> Option<String>,
+    text: impl Fn(&SeenWindow) -> String,
 ) -> Result<Written> {
     let mut written = Written::to(target);
-    let mut write = |target: &Target, seen: &SeenWindow, index: Option<usize>| -> Result<()> {
-        let text = text(seen, index);
-        written.add(write_file(target, text.as_bytes())?);
-        written.remarks.extend(remark(target, seen, &text));
+    let mut write = |target: &Target, seen: &SeenWindow| -> Result<()> {
+        written.add(write_file(target, text(seen).as_bytes())?);
         Ok(())
     };
     let frames = &view.frames;
     if target.is_numbered() {
         for (k, frame) in frames.iter().enumerate() {
-            let target = target.numbered(frame.index, frames.len());
-            write(&target, &view.seen(k), Some(frame.index))?;
+            write(&target.numbered(frame.index, frames.len()), &view.seen(k))?;
         }
     } else if frames.len() == 1 {
-        write(target, &view.seen(0), None)?;
+        write(target, &view.seen(0))?;
     } else if let Some(all) = union(view) {
-        write(target, &all, None)?;
+        write(target, &all)?;
     }
     Ok(written)
 }

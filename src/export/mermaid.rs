@@ -4,41 +4,28 @@ use std::fmt::Write as _;
 
 use super::{Started, at_end, text_per_window};
 use crate::base::words;
-use crate::draw::style::Style;
+use crate::draw::picture::{options, short_name};
+use crate::draw::style::{Body, Change, Color, Style};
 use crate::export::sequence::Sequence;
 use crate::export::target::Target;
-use crate::view::{ItemKind, Mark, SeenWindow, Shown, View};
+use crate::view::{ItemKind, Mark, SeenWindow, View};
 
 /// Begins the files, one per window; without `{n}` one file with the single window or the union of all.
 pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
-    let (view, style) = (sequence.view, Style::builtin("light")?);
+    let style = Style::builtin("light")?;
+    let is_large = sequence.view.arrows.len() > MANY;
+    let view = sequence
+        .paired
+        .filter(|_| is_large)
+        .unwrap_or(sequence.view);
     let target = target.clone();
     Ok(at_end(move || {
-        text_per_window(
-            view,
-            &target,
-            |seen, _| chart(view, &style, seen),
-            too_large,
-        )
+        text_per_window(view, &target, |seen| chart(view, &style, seen))
     }))
 }
 
-/// The numbers of edges and of characters above which Mermaid refuses to draw unless it is configured otherwise (its
-/// `maxEdges` and `maxTextSize`).
-const MOST: (usize, usize) = (500, 50_000);
-
-fn too_large(target: &Target, seen: &SeenWindow, text: &str) -> Option<String> {
-    let (edges, bytes) = (seen.arrows.len(), text.len());
-    (edges > MOST.0 || bytes > MOST.1).then(|| {
-        format!(
-            "`{}` has {edges} edges in {bytes} characters: Mermaid draws at most {} in {}; hide or collapse some elements",
-            target.path().display(),
-            MOST.0,
-            MOST.1
-        )
-    })
-}
-
+/// The most edges of a chart with a box per topic: on a page, the text of a larger one is about 4 pixels high.
+pub(crate) const MANY: usize = 20;
 /// One window as a flow chart. Ids are numbers, so that no name can break the syntax.
 pub(crate) fn chart(view: &View, style: &Style, seen: &SeenWindow) -> String {
     let mut out = String::from("flowchart LR\n");
@@ -48,85 +35,65 @@ pub(crate) fn chart(view: &View, style: &Style, seen: &SeenWindow) -> String {
         let Some(arrow) = view.arrows.get(shown.arrow()) else {
             continue;
         };
-        let line = match (&arrow.kind, shown.mark) {
-            (_, Some(Mark::Removed | Mark::Away)) => "-.->",
+        let line = match shown.mark {
+            Some(Mark::Removed | Mark::Away) => "-.->",
             _ => "-->",
         };
+        let (from, to, both) = match shown.ways() {
+            [true, true] => (arrow.from, arrow.to, "<"),
+            [false, true] => (arrow.to, arrow.from, ""),
+            _ => (arrow.from, arrow.to, ""),
+        };
+        let space = view.items[from]
+            .cluster
+            .filter(|at| view.items[to].cluster == Some(*at));
         let topic = arrow.carries(shown);
-        let topic = topic.map_or_else(String::new, |topic| escaped(&topic));
-        let label = match (topic, shown.hz.filter(|hz| *hz > 0.0)) {
-            (topic, None) => topic,
-            (topic, Some(hz)) => format!("{topic} {}", words::rate(hz))
-                .trim_start()
-                .to_owned(),
+        let topic = topic.map_or_else(String::new, |topic| relative(view, space, &topic));
+        let rate = shown.hz.filter(|hz| *hz > 0.0).map(words::rate);
+        let label = format!("{topic} {}", rate.unwrap_or_default());
+        let label = match label.trim() {
+            "" => String::new(),
+            label => format!("|\"{label}\"|"),
         };
-        let label = if label.is_empty() {
-            label
-        } else {
-            format!("|\"{label}\"|")
-        };
-        let _ = writeln!(out, "  i{} {line}{label} i{}", arrow.from.0, arrow.to.0);
-        if let Some(class) = shown.mark.map(Mark::class) {
-            let _ = writeln!(marked, "  linkStyle {at} stroke:{}", colour(style, class));
+        let _ = writeln!(out, "  i{} {both}{line}{label} i{}", from.0, to.0);
+        if let Some(mark) = shown.mark {
+            let color = options::change(style, mark).color;
+            let _ = writeln!(marked, "  linkStyle {at} stroke:{color}");
         }
     }
-    for (class, body) in [("node", &style.node), ("topic", &style.topic)] {
-        let _ = writeln!(
-            out,
-            "  classDef {class} fill:{},stroke:{},color:{}",
-            body.fill, body.stroke, body.text
-        );
-    }
-    let changes = [
-        ("added", &style.added),
-        ("removed", &style.removed),
-        ("changed", &style.changed),
-    ];
-    for (class, change) in changes {
-        let dash = if class == "removed" {
-            ",stroke-dasharray:6 4"
-        } else {
-            ""
-        };
-        let _ = writeln!(
-            out,
-            "  classDef {class} fill:{},stroke:{},color:{},stroke-width:3px{dash}",
-            change.fill, change.color, change.text
-        );
-    }
     let away = style.away();
-    let _ = writeln!(
-        out,
-        "  classDef away fill:none,stroke:{},color:{},stroke-dasharray:2 4",
-        away.stroke, away.text
-    );
+    let body = |body: &Body| [body.fill, body.stroke, body.text];
+    let change = |change: &Change| [change.fill, change.color, change.text];
     let cluster = &style.cluster;
-    let _ = writeln!(
-        out,
-        "  classDef space fill:{},stroke:{},color:{}",
-        cluster.fill, cluster.stroke, cluster.text
-    );
-    out + &marked
-}
-
-fn colour(style: &Style, class: &str) -> String {
-    match class {
-        "added" => style.added.color.to_string(),
-        "removed" | "away" => style.removed.color.to_string(),
-        _ => style.changed.color.to_string(),
+    let classes = [
+        ("node", body(&style.node), ""),
+        ("topic", body(&style.topic), ""),
+        ("added", change(&style.added), ",stroke-width:3px"),
+        (
+            "removed",
+            change(&style.removed),
+            ",stroke-width:3px,stroke-dasharray:6 4",
+        ),
+        ("changed", change(&style.changed), ",stroke-width:3px"),
+        (
+            "away",
+            [Color::NONE, away.stroke, away.text],
+            ",stroke-dasharray:2 4",
+        ),
+        ("space", [cluster.fill, cluster.stroke, cluster.text], ""),
+    ];
+    for (class, [fill, stroke, text], more) in classes {
+        let _ = writeln!(
+            out,
+            "  classDef {class} fill:{fill},stroke:{stroke},color:{text}{more}"
+        );
     }
+    out + &marked
 }
 
 /// The namespaces and items directly in a namespace. Namespaces nest at most 16 deep.
 fn members(view: &View, seen: &SeenWindow, out: &mut String, home: Option<usize>, depth: usize) {
     let indent = "  ".repeat(depth);
-    // Names in a subgraph are written as there.
-    let around = home.map_or("", |at| &*view.namespaces[at].name);
-    let relative = |name: &str| {
-        let inside = name.strip_prefix(around).filter(|_| home.is_some());
-        let inside = inside.and_then(|rest| rest.strip_prefix('/'));
-        escaped(inside.unwrap_or(name))
-    };
     for (at, space) in view
         .namespaces
         .iter()
@@ -136,7 +103,7 @@ fn members(view: &View, seen: &SeenWindow, out: &mut String, home: Option<usize>
         let mut inside = String::new();
         members(view, seen, &mut inside, Some(at), depth + 1);
         if !inside.is_empty() {
-            let name = relative(&space.name);
+            let name = relative(view, home, &space.name);
             let _ = write!(
                 out,
                 "{indent}subgraph s{at}[\"{name}\"]\n{inside}{indent}end\n{indent}class s{at} space\n"
@@ -153,21 +120,23 @@ fn members(view: &View, seen: &SeenWindow, out: &mut String, home: Option<usize>
             ItemKind::Namespace | ItemKind::Group => ("[[", "]]"),
             ItemKind::Topic => ("[", "]"),
         };
-        let name = relative(&item.name);
+        let name = relative(view, home, &item.name);
         let _ = writeln!(
             out,
             "{indent}i{}{open}\"{name}\"{close}:::{}",
             shown.id,
             item.kind.word()
         );
-        if let Some(class) = mark(shown) {
-            let _ = writeln!(out, "{indent}class i{} {class}", shown.id);
+        if let Some(mark) = shown.mark {
+            let _ = writeln!(out, "{indent}class i{} {}", shown.id, mark.class());
         }
     }
 }
 
-fn mark(shown: &Shown) -> Option<&'static str> {
-    shown.mark.map(Mark::class)
+/// A name as it is written inside the subgraph of a namespace.
+fn relative(view: &View, home: Option<usize>, name: &str) -> String {
+    let inside = home.map_or("", |at| &*view.namespaces[at].name);
+    escaped(short_name(name, inside))
 }
 
 /// A name inside quotes, with Mermaid's entities for all characters that could end the text or begin markup.

@@ -63,7 +63,7 @@ fn report(sequence: &Sequence<'_>) -> String {
     };
     out.push_str(&phases(mission, &times));
     out.push_str(&changes(mission, view, &times));
-    out.push_str(&chart::chart(view));
+    out.push_str(&chart::chart(view, sequence.paired));
     out.push_str(&nodes(mission, view, &info));
     out.push_str(&topics(mission, view, &info));
     out.push_str(&evidence(mission, &info));

@@ -110,6 +110,8 @@ pub struct Sequence<'a> {
     pub picture: &'a dyn Drawings,
     /// The view with everything expanded, if an output needs it.
     pub unfolded: Option<Unfolded<'a>>,
+    /// The view with one line per pair of nodes, for charts with many lines, if an output needs it.
+    pub paired: Option<&'a View>,
     /// The painter that turns a drawing into pixels.
     pub painter: &'a Painter,
     /// The fonts for all text.

@@ -1,6 +1,7 @@
 //! The rate of every sender over the mission, in pieces: a piece ends where the log has another rate, or at a long silence.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use super::Mission;
 use super::event_log::Kind;
@@ -19,6 +20,22 @@ const SEEN: i64 = 400;
 pub(crate) struct Piece {
     pub(crate) span: Span,
     pub(crate) hz: f64,
+}
+
+/// A role that sends a topic, with the times in which it does: at least one, sorted and disjoint.
+pub(crate) struct Holder<'a> {
+    pub(crate) role: &'a str,
+    pub(crate) times: Vec<Span>,
+}
+
+impl Holder<'_> {
+    pub(crate) fn start(&self) -> Stamp {
+        self.times.first().map_or(Stamp::MAX, |time| time.start)
+    }
+
+    pub(crate) fn end(&self) -> Stamp {
+        self.times.last().map_or(Stamp::MIN, |time| time.end)
+    }
 }
 
 /// The rates of a mission's senders.
@@ -63,6 +80,25 @@ impl<'a> Rates<'a> {
     pub(crate) fn of_topic(&self, topic: TopicId) -> Vec<&'a Sender> {
         let senders = self.mission.sending.of_topic(topic).iter();
         senders.filter(|sender| !sender.is_latched).collect()
+    }
+
+    /// The roles that send a topic with the times in which they do, in order of these.
+    pub(crate) fn holders(&self, topic: TopicId) -> Vec<Holder<'a>> {
+        let mut roles: BTreeMap<&Arc<str>, Vec<&Sender>> = BTreeMap::new();
+        for sender in self.of_topic(topic) {
+            let node = sender.node.map(|id| &self.mission.elements.nodes[id]);
+            if let Some(node) = node {
+                roles.entry(&node.role).or_default().push(sender);
+            }
+        }
+        let holder = |(role, senders): (&'a Arc<str>, Vec<&Sender>)| {
+            let times = self.of(&senders).iter().map(|piece| piece.span).collect();
+            let times = Span::joined(times, 0);
+            (!times.is_empty()).then_some(Holder { role, times })
+        };
+        let mut holders: Vec<Holder<'_>> = roles.into_iter().filter_map(holder).collect();
+        holders.sort_by_key(Holder::start);
+        holders
     }
 
     /// The publications among some elements; on the topic of this name, if one is given.
@@ -131,6 +167,18 @@ impl<'a> Rates<'a> {
         };
         runs.filter_map(piece).collect()
     }
+}
+
+/// The smallest relative difference of two rates after each other that is written as a step: of the same rate before and
+/// after a silence, the measured ones differ by a few hundredths.
+const STEP: f64 = 0.05;
+
+/// The rates of some pieces in order, those that are nearly equal as one; none if there is only one.
+pub(crate) fn steps(pieces: &[Piece]) -> Vec<f64> {
+    let mut steps: Vec<f64> = pieces.iter().map(|piece| piece.hz).collect();
+    steps.dedup_by(|a, b| (*a - *b).abs() <= STEP * a.max(*b));
+    steps.truncate(if steps.len() > 1 { steps.len() } else { 0 });
+    steps
 }
 
 /// The mean rate over some pieces; `None` if they have no length.

@@ -287,6 +287,7 @@ impl<'a> Showing<'a> {
             view,
             picture: &(),
             unfolded: None,
+            paired: None,
             painter: &self.painter,
             fonts: &self.drawing.fonts,
             strip: None,
@@ -339,6 +340,7 @@ impl<'a> Showing<'a> {
         remarks.for_each(|text| self.remark(text));
         self.notices.extend(composed.notices.iter());
         let places = is_drawn.then(|| composed.places());
+        let paired = self.paired();
         let sequence = Sequence {
             places: places.as_ref(),
             picture: picture.as_ref().map_or(&(), |p| p as &dyn Drawings),
@@ -349,6 +351,7 @@ impl<'a> Showing<'a> {
                 rate_change: drawing.page.rate_change,
             }),
             strip: strip.as_ref().map(|strip| &strip.scene),
+            paired: paired.as_ref().map(|paired| &paired.view),
             ..self.sequence(view)
         };
         self.write(&sequence, watch)
@@ -361,6 +364,16 @@ impl<'a> Showing<'a> {
             notices: Notices::new(),
             ..Composed::new(self.mission, view, page)
         }
+    }
+
+    /// The view with one line per pair of nodes, if an output is or contains a chart in which topics were not asked for.
+    fn paired(&self) -> Option<Composed> {
+        let mut drawing = self.drawing.clone();
+        let is_chart = |output: &Output| matches!(output.format.word, "mmd" | "md");
+        let is_free = !drawing.view.keeps_topics && self.outputs.iter().any(is_chart);
+        (drawing.view.mode, drawing.view.is_bundled) = (Mode::Nodes, true);
+        drawing.view.is_picture = false;
+        is_free.then(|| self.unplaced(&drawing))
     }
 
     /// The film strip, if requested or needed by an output.

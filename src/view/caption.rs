@@ -4,15 +4,18 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::mem::discriminant;
 
+use super::choose::is_infrastructure;
 use super::items::Viewed;
 use super::state::LivingItems;
 use super::{Frame, Headline, ItemKind, OngoingEvent, Phrase};
 use crate::base::name::{ShortNames, is_quiet};
+use crate::base::rhythm::OVERLAP_NS;
 use crate::base::time::Stamp;
 use crate::base::words;
 use crate::graph::{Element, Elements, NodeId, TopicId, Wiring};
 use crate::mission::Mission;
 use crate::mission::event_log::{Detail, Event, EventId, EventLog, Kind, Parts, interrupted};
+use crate::mission::rates::Rates;
 
 /// The largest length of a name in characters; longer ones would fill a headline alone.
 const LONGEST_NAME: usize = 48;
@@ -40,6 +43,32 @@ pub(crate) struct CaptionWriter<'a> {
     wiring: Wiring,
     /// The short names of the picture's nodes and topics.
     names: [ShortNames<'a>; 2],
+    /// The beginnings of times in which two nodes send a topic, with its id and their roles.
+    shared: Vec<(Stamp, TopicId, [&'a str; 2])>,
+}
+
+/// The first moment at which two nodes send a topic that do not from the beginning, for long enough to be no hand-over. All
+/// nodes send to infrastructure.
+fn shared<'a>(mission: &'a Mission, viewed: &Viewed<'_>) -> Vec<(Stamp, TopicId, [&'a str; 2])> {
+    let rates = Rates::new(mission);
+    let begun = mission.span.start.plus(OVERLAP_NS);
+    let mut all = Vec::new();
+    for (id, topic) in mission.elements.topics.with_ids() {
+        if is_infrastructure(topic.name.as_str()) || !viewed.sees(Element::Topic(id)) {
+            continue;
+        }
+        for pair in rates.holders(id).windows(2) {
+            let times = pair[0]
+                .times
+                .iter()
+                .flat_map(|a| pair[1].times.iter().map(move |b| (a, b)));
+            let mut both = times.filter(|(a, b)| a.shared(**b) > OVERLAP_NS);
+            let since = both.next().map(|(a, b)| a.start.max(b.start));
+            let since = since.filter(|since| *since > begun);
+            all.extend(since.map(|since| (since, id, [pair[0].role, pair[1].role])));
+        }
+    }
+    all
 }
 
 /// The events of a window, in the order of their phrases, each with the values that are equal within one
@@ -65,6 +94,7 @@ impl<'a> CaptionWriter<'a> {
             last: None,
             wiring: elements.wiring(|_, _| true),
             names: [names(&mut nodes), names(&mut topics)],
+            shared: shared(mission, viewed),
         }
     }
 
@@ -151,6 +181,13 @@ impl<'a> CaptionWriter<'a> {
         let away = frame.ongoing.iter().filter(|l| l.ended.is_none());
         let mut whats = leaves.map(|h| h.what).chain(away.map(|l| l.what));
         parts.extend(whats.find_map(|what| self.missed(what, after)));
+        let mut shared = self.shared.iter();
+        let shared = shared.find(|(since, ..)| frame.span.contains(*since));
+        parts.extend(shared.map(|(_, topic, roles)| {
+            let [a, b] = roles.map(|role| self.names[0].of(role));
+            let topic = self.name(Element::Topic(*topic));
+            format!("{a} and {b} both send {topic}")
+        }));
         parts.retain(|part| !part.is_empty());
         parts.join(" · ")
     }

@@ -1,5 +1,8 @@
 //! The windows of the picture one after the other, each with its events, their numbers and the words of its headline.
 
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
 use super::caption::{CaptionWriter, STILL_AWAY};
 use super::items::Viewed;
 use super::listed::beginning;
@@ -136,6 +139,8 @@ struct ShownWindows<'a> {
     now: Now<'a>,
     changes: WindowChanges,
     member_lists: Vec<Vec<MemberState>>,
+    /// The topics that each item sends and no line shows.
+    unlined: ById<ItemId, Vec<Arc<str>>>,
     items: ShownSoFar<ItemId>,
     arrows: ShownSoFar<ArrowId>,
 }
@@ -198,6 +203,7 @@ impl<'a> ShownWindows<'a> {
             now: Now::new(mission, options, viewed),
             changes: WindowChanges::default(),
             member_lists: Vec::new(),
+            unlined: ById::like(&viewed.items, Vec::new()),
             items: ShownSoFar::new(&viewed.items),
             arrows: ShownSoFar::new(&viewed.arrows),
         }
@@ -243,6 +249,7 @@ impl<'a> ShownWindows<'a> {
         let items = self.viewed.items.ids();
         let items = items.map(|id| changes.item(now, id, there(id)));
         let items: ById<ItemId, Option<Shown>> = items.collect();
+        let mut lined = BTreeSet::new();
         for (id, arrow) in self.viewed.arrows.with_ids() {
             let mut shown = None;
             if let (Some(from), Some(to)) = (&items[arrow.from], &items[arrow.to]) {
@@ -258,9 +265,31 @@ impl<'a> ShownWindows<'a> {
                     shown = changes.arrow(now, id, there, ends);
                 }
             }
+            for row in shown.iter().flat_map(|shown| &shown.topics) {
+                let ends = [arrow.from, arrow.to].into_iter().zip(row.ways);
+                let topic = &arrow.topics[row.topic as usize];
+                lined.extend(ends.filter_map(|(end, is)| is.then_some((end, topic))));
+            }
             self.arrows.show(at, id, shown);
         }
-        for (id, shown) in self.viewed.items.ids().zip(items) {
+        let mut unlined = ById::like(&items, BTreeSet::new());
+        for (publish, topic) in self.viewed.bundles() {
+            let sender = self.viewed.item_of_sender(publish);
+            if let Some(sender) = sender.filter(|id| !lined.contains(&(*id, topic)))
+                && now.one(Element::Publish(publish)).is_some()
+            {
+                unlined[sender].insert(Arc::clone(topic));
+            }
+        }
+        self.unlined = unlined
+            .into_iter()
+            .map(|all| all.into_iter().collect())
+            .collect();
+        for ((id, shown), unlined) in self.viewed.items.ids().zip(items).zip(&self.unlined) {
+            let shown = shown.map(|shown| Shown {
+                unlined: unlined.clone(),
+                ..shown
+            });
             self.items.show(at, id, shown);
         }
     }
@@ -298,7 +327,9 @@ impl<'a> ShownWindows<'a> {
         let (after, stays) = (&changes.after, (true, true));
         for id in self.items.take_touched() {
             let shown = after.items[id].then(|| changes.item(now, id, stays));
-            self.items.show(at, id, shown.flatten());
+            let unlined = self.unlined[id].clone();
+            let shown = shown.flatten().map(|shown| Shown { unlined, ..shown });
+            self.items.show(at, id, shown);
         }
         for id in self.arrows.take_touched() {
             let ends = [self.viewed.arrows[id].from, self.viewed.arrows[id].to];
@@ -688,7 +719,7 @@ mod tests {
         assert_eq!(seen(&windows, &ViewOptions::default()), want);
         let (view, _) = view(&mission(&windows), &ViewOptions::default());
         let topic = &view.seen(2).items[2];
-        assert_eq!((topic.rates, topic.hz), (Some((20.0, 5.0)), Some(5.0)));
+        assert_eq!((&topic.steps[..], topic.hz), (&[20.0, 5.0][..], Some(5.0)));
         assert_eq!(
             (view.frames[2].counts.rates, view.frames[0].counts),
             (1, crate::view::Counts::default())

@@ -9,6 +9,7 @@ use super::fold::topics::{self, Groups};
 use super::fold::{Boxes, ItemKey, alike, roles};
 use super::listed::{self, Words};
 use super::{Arrow, ArrowId, ArrowKind, Grouping, Item, ItemId, ItemKind, Mode, ViewOptions};
+use crate::base::name::last_part;
 use crate::graph::{ById, Edge, EdgeId, Element, Elements, Id as _, PerElement, TopicId};
 use crate::mission::Mission;
 
@@ -72,7 +73,11 @@ impl<'a> Viewed<'a> {
         let elements = &mission.elements;
         let mut selection = select(elements, options);
         let grouping = match options.mode {
-            Mode::Nodes if !options.is_bundled => Grouping::NONE,
+            // rqt_graph has an arrow for each topic of an action.
+            Mode::Nodes if !options.is_bundled => Grouping {
+                actions: options.group.actions && !options.exact_names,
+                ..Grouping::NONE
+            },
             _ => options.group,
         };
         let seen: ById<TopicId, bool> = selection.topics.iter().map(Option::is_none).collect();
@@ -259,7 +264,7 @@ impl<'a> Viewed<'a> {
         Some((node, self.item_of(Element::Topic(edge.topic))?))
     }
 
-    /// Arrows from publishers to subscribers: one per topic between two of them, or one for all topics in a bundle.
+    /// Arrows from publishers to subscribers: one per topic or action between two of them, or one for all topics in a bundle.
     fn set_direct(&mut self, options: &ViewOptions) {
         let (elements, is_bundled) = (self.elements, options.is_bundled);
         let mut subscribers = ById::like(&elements.topics, Vec::new());
@@ -294,11 +299,17 @@ impl<'a> Viewed<'a> {
                 if pairs > MOST_PAIRS || is_bundled && from == *to {
                     continue;
                 }
+                let line = &self.bundled[edge.topic];
+                let is_answer =
+                    matches!(last_part(name.as_str()), "status" | "result" | "feedback");
                 let ends = if is_bundled {
                     // One line for both directions.
                     (from.min(*to), from.max(*to), ArrowKind::Bundle)
                 } else {
-                    (from, *to, ArrowKind::Direct(name.shared()))
+                    // The arrow of an action begins at its client.
+                    let is_back = is_answer && *line != name.shared();
+                    let (from, to) = if is_back { (*to, from) } else { (from, *to) };
+                    (from, to, ArrowKind::Direct(Arc::clone(line)))
                 };
                 arrows.entry(ends).or_default().push((publish, *subscribe));
             }
@@ -341,8 +352,16 @@ impl<'a> Viewed<'a> {
         item.at() < self.items.len() - self.in_words
     }
 
+    /// The publications on the lines of bundles, with the names of their topics there.
+    pub(crate) fn bundles(&self) -> impl Iterator<Item = (EdgeId, &Arc<str>)> {
+        let all = self.arrows.iter().zip(&self.pairs);
+        let bundles = all.filter(|(arrow, _)| arrow.kind == ArrowKind::Bundle);
+        let publications = bundles.flat_map(|(_, pairs)| pairs.iter().map(|(publish, _)| *publish));
+        publications.map(|id| (id, &self.bundled[self.elements.publishes[id].topic]))
+    }
+
     /// The item of the node that publishes.
-    fn item_of_sender(&self, publish: EdgeId) -> Option<ItemId> {
+    pub(crate) fn item_of_sender(&self, publish: EdgeId) -> Option<ItemId> {
         let edge = self.elements.publishes.get(publish)?;
         self.item_of(Element::Node(edge.node))
     }

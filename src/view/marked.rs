@@ -5,10 +5,12 @@ use std::collections::BTreeMap;
 use super::items::{Place, Viewed};
 use super::state::{LivingItems, Now};
 use super::{Arrow, ArrowId, ArrowKind, Counts, Headline, ItemId, ItemKind, Mark, Shown};
+use crate::base::name::last_part;
 use crate::base::time::{Span, Stamp};
 use crate::graph::Element;
 use crate::mission::EventLog;
 use crate::mission::event_log::{Detail, Event, EventId, Kind, Parts};
+use crate::mission::rates::same;
 
 /// The changes of an item or arrow in a window.
 #[derive(Clone, Debug, Default)]
@@ -18,8 +20,8 @@ pub(crate) struct Changed {
     pub(crate) went: bool,
     /// Its mark if it existed before and still does.
     pub(crate) mark: Option<Mark>,
-    /// Messages per second before and after.
-    pub(crate) rates: Option<(f64, f64)>,
+    /// Messages per second before, between and after its changes of rates; none without any.
+    pub(crate) rates: Vec<f64>,
     /// The headlines behind the mark, sorted.
     pub(crate) events: Vec<EventId>,
 }
@@ -223,11 +225,23 @@ impl Report<'_> {
         if let Err(place) = reported.events.binary_search(&self.headline) {
             reported.events.insert(place, self.headline);
         }
+        if let Some(rates) = self.rates().filter(|_| reach == Reach::Whole) {
+            then(&mut reported.rates, rates);
+        }
         let mark = self.mark(reach);
         if mark.map(weight) > reported.mark.map(weight) {
             reported.mark = mark;
-            reported.rates = self.rates().filter(|_| reach == Reach::Whole);
         }
+    }
+}
+
+/// Adds the rates before and after a change to those of the changes before it, unless it is one of these on another edge.
+fn then(rates: &mut Vec<f64>, (before, after): (f64, f64)) {
+    if rates.is_empty() {
+        rates.push(before);
+    }
+    if rates.last().is_some_and(|last| !same(*last, after)) {
+        rates.push(after);
     }
 }
 
@@ -257,6 +271,15 @@ impl WindowChanges {
     /// The look of an item; `there` is whether it exists before and after.
     pub(crate) fn item(&self, now: &Now<'_>, id: ItemId, there: (bool, bool)) -> Option<Shown> {
         let mut shown = marked(now.item(id)?, there, self.marks.items.get(&id))?;
+        if shown.mark == Some(Mark::HandedOver) {
+            shown.sender = shown.events.iter().rev().find_map(|id| {
+                let Detail::Senders { to, .. } = &now.event(*id)?.detail else {
+                    return None;
+                };
+                let node = now.viewed.elements.nodes.get(*to.last()?)?;
+                Some(last_part(node.name.as_str()).into())
+            });
+        }
         if now.viewed.items[id].kind == ItemKind::Namespace {
             shown.inside = self.inside(&shown);
         }
@@ -305,7 +328,11 @@ impl WindowChanges {
                     for event in &events {
                         let topic = now.viewed.elements.ends(event.what).1;
                         if topic.is_some_and(|topic| now.viewed.bundled[topic] == *name) {
-                            (row.mark, row.rates) = changed(event);
+                            let (mark, rates) = changed(event);
+                            row.mark = Some(mark);
+                            if let Some(rates) = rates {
+                                then(&mut row.steps, rates);
+                            }
                         }
                     }
                 }
@@ -323,7 +350,7 @@ impl WindowChanges {
 }
 
 /// The mark of a topic of a bundle for an event, with its rates before and after.
-fn changed(event: &Event) -> (Option<Mark>, Option<(f64, f64)>) {
+fn changed(event: &Event) -> (Mark, Option<(f64, f64)>) {
     match (event.kind, &event.detail) {
         (_, Detail::Rates { from_hz, to_hz }) => {
             let mark = if to_hz > from_hz {
@@ -331,11 +358,11 @@ fn changed(event: &Event) -> (Option<Mark>, Option<(f64, f64)>) {
             } else {
                 Mark::Slower
             };
-            (Some(mark), Some((*from_hz, *to_hz)))
+            (mark, Some((*from_hz, *to_hz)))
         }
-        (Kind::HandedOver, _) => (Some(Mark::HandedOver), None),
-        (Kind::Silent, _) => (Some(Mark::Paused), None),
-        _ => (Some(Mark::Changed), None),
+        (Kind::HandedOver, _) => (Mark::HandedOver, None),
+        (Kind::Silent, _) => (Mark::Paused, None),
+        _ => (Mark::Changed, None),
     }
 }
 
@@ -378,9 +405,7 @@ fn marked(shown: Shown, there: (bool, bool), reported: Option<&Changed>) -> Opti
     };
     Some(Shown {
         mark,
-        rates: reported
-            .rates
-            .filter(|_| matches!(mark, Some(Mark::Faster | Mark::Slower))),
+        steps: reported.rates.clone(),
         events: reported.events.clone(),
         ..shown
     })

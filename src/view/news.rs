@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{Item, ItemId, Shown, ShownRuns, View};
 use crate::base::name::namespace;
-use crate::graph::{ById, Id as _};
+use crate::graph::ById;
 
 /// The part of a view that changes in one of its windows.
 pub(crate) struct News {
@@ -22,56 +22,42 @@ impl View {
     /// from and to an item that changes. `None` past the last window, and if nothing with a box changes.
     pub(crate) fn news(&self, k: usize) -> Option<News> {
         let frame = self.frames.get(k)?;
-        let seen = self.seen(k);
-        let is_new = |shown: &Shown| shown.mark.is_some();
-        let mut changes = ById::like(&self.items, false);
-        for shown in seen.items.iter().filter(|shown| is_new(shown)) {
-            changes[shown.item()] = true;
-        }
-        let mut kept = changes.clone();
-        let mut lines: Vec<&Shown> = Vec::new();
-        for shown in &seen.arrows {
-            let arrow = &self.arrows[shown.arrow()];
-            if is_new(shown) || changes[arrow.from] || changes[arrow.to] {
-                (kept[arrow.from], kept[arrow.to]) = (true, true);
-                lines.push(shown);
+        let is_new = |looks: &ShownRuns| looks.at(k).is_some_and(|shown| shown.mark.is_some());
+        let changes: ById<ItemId, bool> = self.items_shown.iter().map(is_new).collect();
+        let (mut kept, mut lined) = (changes.clone(), ById::like(&self.arrows, false));
+        for ((id, arrow), looks) in self.arrows.with_ids().zip(&self.arrows_shown) {
+            let is_part = is_new(looks) || changes[arrow.from] || changes[arrow.to];
+            if is_part && looks.at(k).is_some() {
+                (kept[arrow.from], kept[arrow.to], lined[id]) = (true, true, true);
             }
         }
-        if !kept.iter().any(|is| *is) {
+        let items = self.items.with_ids().filter(|(id, _)| kept[*id]);
+        let names: Vec<&str> = items.map(|(_, item)| &*item.name).collect();
+        if names.is_empty() {
             return None;
         }
-        let items = seen.items.iter().filter(|shown| kept[shown.item()]);
-        let items: Vec<&Shown> = items.collect();
-        let names: Vec<&str> = items
-            .iter()
-            .map(|shown| &*self.items[shown.item()].name)
-            .collect();
         let home = home(&names);
-        let mut places: ById<ItemId, Option<ItemId>> = ById::like(&self.items, None);
-        for (at, shown) in items.iter().enumerate() {
-            places[shown.item()] = Some(ItemId::of(at));
-        }
-        let place = |id: ItemId| places.get(id).copied().flatten();
-        let arrows = lines.iter().filter_map(|shown| {
-            let arrow = self.arrows[shown.arrow()].clone();
-            let (from, to) = (place(arrow.from)?, place(arrow.to)?);
-            Some(super::Arrow { from, to, ..arrow })
-        });
-        let view = Self {
-            items: items
-                .iter()
-                .map(|shown| relative(&self.items[shown.item()], home.as_deref()))
-                .collect(),
-            arrows: arrows.collect(),
-            items_shown: alone(items.iter().copied()),
-            arrows_shown: alone(lines.iter().copied()),
+        let items = self.items.iter();
+        let alone = |looks: &ShownRuns| ShownRuns::of([self.seen_at(looks, k).as_ref()]);
+        let there = self
+            .items_shown
+            .iter()
+            .filter(|looks| looks.at(k).is_some());
+        let left_out = there.count() - names.len();
+        let mut view = Self {
+            items: items.map(|item| relative(item, home.as_deref())).collect(),
+            arrows: self.arrows.clone(),
+            items_shown: self.items_shown.iter().map(alone).collect(),
+            arrows_shown: self.arrows_shown.iter().map(alone).collect(),
             frames: vec![frame.clone()],
             ..Self::default()
         };
+        view.keep_arrows(&lined);
+        view.keep_items(&kept);
         Some(News {
-            left_out: seen.items.len() - view.items.len(),
-            home,
             view,
+            home,
+            left_out,
         })
     }
 }
@@ -97,18 +83,6 @@ impl View {
             ..self.clone()
         }
     }
-}
-
-/// Each of these looks as that of the only window, under its new id.
-fn alone<'a, I: crate::graph::Id>(all: impl Iterator<Item = &'a Shown>) -> ById<I, ShownRuns> {
-    let looks = all.zip(0_u32..).map(|(shown, id)| {
-        let shown = Shown {
-            id,
-            ..shown.clone()
-        };
-        ShownRuns::of([Some(&shown)])
-    });
-    looks.collect()
 }
 
 /// The namespace of most of these names; none if it is the root, or that of one of them.

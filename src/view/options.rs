@@ -201,6 +201,8 @@ pub struct ViewOptions {
     pub(crate) is_still: Option<bool>,
     /// The phases in which nodes of one namespace must be alike to share a box; none if each has its own.
     pub(crate) alike_in: Vec<Span>,
+    /// Whether charts in Markdown have a box per topic however many lines they have.
+    pub(crate) keeps_topics: bool,
     /// Whether bundles count the topics that a single node sends beside its name, unless there is an event about them.
     pub(crate) counts_rows: bool,
     /// Whether bundles list nodes without a line as words although they change or send, if their topics are counted.

@@ -98,10 +98,11 @@ pub struct Shown {
     /// The rate that is written, with its number of messages: that of an earlier window as long as the
     /// difference may be random.
     pub held: Option<(f64, Option<u64>)>,
-    /// Messages per second before and after, if `mark` is `Faster` or `Slower`.
-    pub rates: Option<(f64, f64)>,
-    /// The rates of a still in order, in messages per second, if there are several.
+    /// The rates of a still, or before, between and after the changes in the window, in messages per second; none if there is
+    /// only one.
     pub steps: Vec<f64>,
+    /// The node that sends it from now on, if `mark` is `HandedOver`.
+    pub sender: Option<Arc<str>>,
     /// Whether it is silent or away during the whole window, with a beginning and an end in the event log, or
     /// before its first message.
     pub is_paused: bool,
@@ -115,6 +116,9 @@ pub struct Shown {
     pub topics: Vec<TopicRow>,
     /// The number of equal namespaces it represents in the window; 0 for everything else.
     pub each: usize,
+    /// The topics that it sends although the lines of bundles to their subscribers are not there; none for everything but
+    /// boxes.
+    pub unlined: Vec<Arc<str>>,
     /// The nodes and topics in a collapsed namespace in the graph of the window; none for everything else.
     pub members: Members,
     /// The number of headlines of each kind about elements inside a collapsed namespace or a bundle; `None` without any.
@@ -201,6 +205,16 @@ impl Shown {
         cast::to_u8(libm::round(decades * 2.0).clamp(0.0, f64::from(STEPS)))
     }
 
+    /// Whether its messages run along the arrow, and whether they run against it, if it is a bundle.
+    pub(crate) fn ways(&self) -> [bool; 2] {
+        [0, 1].map(|way| self.topics.iter().any(|row| row.ways[way]))
+    }
+
+    /// Whether its rate changed in the window.
+    pub(crate) fn has_new_rate(&self) -> bool {
+        matches!(self.mark, Some(Mark::Faster | Mark::Slower)) && self.steps.len() > 1
+    }
+
     /// The mark that its badge shows, if it has one.
     pub(crate) fn badge(&self) -> Option<Mark> {
         self.mark.filter(|_| !self.is_one_of_many)
@@ -249,9 +263,8 @@ pub struct TopicRow {
     pub count: Option<u64>,
     /// Its change, if different from that of the whole line.
     pub mark: Option<Mark>,
-    /// Messages per second before and after, if its rate changed.
-    pub rates: Option<(f64, f64)>,
-    /// The rates of a still in order, in messages per second, if there are several.
+    /// The rates of a still, or before, between and after the changes in the window, in messages per second; none if there is
+    /// only one.
     pub steps: Vec<f64>,
 }
 
@@ -270,7 +283,6 @@ impl TopicRow {
             hz: shown.hz,
             count: shown.count,
             mark: None,
-            rates: None,
             steps: Vec::new(),
         }
     }
@@ -341,7 +353,7 @@ impl ShownRuns {
 
     /// Its looks in order, each with its first window, the first window after it, and its index; the last applies to the
     /// end of all `windows`.
-    pub(super) fn spans(&self, windows: u32) -> impl Iterator<Item = (u32, u32, u32, &Shown)> {
+    pub(crate) fn spans(&self, windows: u32) -> impl Iterator<Item = (u32, u32, u32, &Shown)> {
         let look = |(from, to, place)| Some((from, to, place, self.distinct.get(place as usize)?));
         self.runs.spans(windows).filter_map(look)
     }
@@ -388,6 +400,7 @@ type LookKey = (
     (usize, Members),
     Vec<RowKey>,
     Option<Arc<str>>,
+    Vec<Arc<str>>,
 );
 
 impl ShownRunsWriter {
@@ -463,6 +476,7 @@ fn key(shown: &Shown) -> LookKey {
         (shown.each, shown.members),
         shown.topics.iter().map(TopicRow::key).collect(),
         shown.lifecycle.clone(),
+        shown.unlined.clone(),
     )
 }
 

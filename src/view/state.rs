@@ -143,7 +143,7 @@ impl<'a> Now<'a> {
     }
 
     /// The look of an element, `None` if it does not exist; silent and only declared if it exists without messages.
-    fn one(&self, what: Element) -> Option<Shown> {
+    pub(crate) fn one(&self, what: Element) -> Option<Shown> {
         let (alive, paused) = &self.lives;
         if !alive.is(what) {
             return None;

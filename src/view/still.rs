@@ -17,7 +17,7 @@ use crate::base::words;
 use crate::graph::history::Sender;
 use crate::graph::{ById, Element};
 use crate::mission::event_log::{Event, Kind};
-use crate::mission::rates::{Rates, same};
+use crate::mission::rates::{Rates, same, steps};
 use crate::mission::{EventId, Mission};
 
 /// The times at which a box of a still was there.
@@ -108,12 +108,9 @@ impl StillRates<'_> {
     /// of the windows, stays if it is the same.
     fn rate(&self, senders: &[&Sender], hz: Option<f64>) -> Option<(f64, Vec<f64>)> {
         let pieces = self.0.of(senders);
-        let mut steps: Vec<f64> = pieces.iter().map(|piece| piece.hz).collect();
-        steps.dedup_by(|a, b| words::rate(*a) == words::rate(*b));
-        steps.truncate(if steps.len() > 1 { steps.len() } else { 0 });
         let mean = self.0.while_sending(senders)?;
         let hz = hz.filter(|hz| same(*hz, mean)).unwrap_or(mean);
-        Some((hz, steps))
+        Some((hz, steps(&pieces)))
     }
 
     /// The look of a box or row of a single topic, with its rates.
@@ -190,15 +187,17 @@ fn gather(slot: &mut Option<Shown>, shown: &Shown, length: f64, windows: u64) {
         hz: row.hz.map(|hz| hz * length),
         count: row.count.map(|count| count.saturating_mul(windows)),
         mark: None,
-        rates: None,
+        steps: Vec::new(),
         ..row.clone()
     });
     let Some(sum) = slot else {
         *slot = Some(Shown {
+            unlined: Vec::new(),
             topics: rows.collect(),
             mark: None,
+            sender: None,
             hz: shown.hz.map(|hz| hz * length),
-            rates: None,
+            steps: Vec::new(),
             events: Vec::new(),
             inside: None,
             lifecycle: None,

@@ -83,6 +83,7 @@ fn main() {
         view: &view,
         picture: &picture,
         unfolded: None,
+        paired: None,
         painter: &painter,
         fonts: &fonts,
         latex: None,

@@ -126,8 +126,10 @@ def flags(s):
         return ['--rqt-defaults']
     hide = [ours for ours, key in [('debug', 'quiet'), ('dead', 'dead'), ('leaf', 'leaf'), ('tf', 'hide_tf'),
                                    ('params', 'params')] if s[key]]
-    group = ['namespaces=%d' % s['cluster']] + [key for key in ('actions', 'tf', 'images') if s[key]]
     mode = {'node_node': 'nodes', 'node_topic': 'active', 'node_topic_all': 'all'}[s['mode']]
+    # Between nodes, rqt_graph draws every topic of an action.
+    kinds = ('tf', 'images') if mode == 'nodes' else ('actions', 'tf', 'images')
+    group = ['namespaces=%d' % s['cluster']] + [key for key in kinds if s[key]]
     return ['--mode', mode, '--ns-filter', s['ns'], '--topic-filter', s['topic'],
             '--hide', ','.join(hide) or 'none', '--group', ','.join(group)]
 

@@ -1,17 +1,13 @@
 //! Who sends each topic that changes hands or has several senders, and when nobody does: a lane of bars per topic, and one
 //! more for each sender at the same time.
 
-use std::collections::BTreeMap;
-use std::sync::Arc;
-
 use super::page::{FigureSheet, drawer, nothing};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::base::name::ShortNames;
-use crate::base::time::{Span, Stamp};
+use crate::base::time::Span;
 use crate::base::words;
-use crate::draw::scene::{Scene, Step, Stroke};
-use crate::draw::style::Color;
+use crate::draw::scene::{Scene, Stroke};
 use crate::draw::timeline::Timeline;
 use crate::draw::timeline::canvas::{HAIRLINE, PaperCanvas, Type, ink};
 use crate::draw::timeline::drawer::{Drawer, clock};
@@ -20,54 +16,18 @@ use crate::draw::timeline::phases::names;
 use crate::draw::timeline::rows::Row;
 use crate::draw::timeline::source::FigureSource;
 use crate::graph::TopicId;
-use crate::graph::history::Sender;
-use crate::mission::rates::Rates;
+use crate::mission::rates::{Holder, Rates};
 
 /// The height of a bar as a share of its lane: neighbours in time and in lanes are apart.
 const BAR: f64 = 0.84;
-/// The distance of the lines of a hatching in millimetres: the eye sees an area, not lines.
-const HATCH: f64 = 1.1;
 /// The space around a name in millimetres.
 const AROUND: f64 = 0.5;
 
-/// A sender with the times in which it sends.
-struct Holder {
-    role: Arc<str>,
-    times: Vec<Span>,
-}
-
-impl Holder {
-    fn end(&self) -> Stamp {
-        self.times.last().map_or(Stamp::MIN, |time| time.end)
-    }
-
-    fn start(&self) -> Stamp {
-        self.times.first().map_or(Stamp::MAX, |time| time.start)
-    }
-}
-
 /// The topics with several senders, in order of their names, each with its lanes.
-fn lanes(source: &FigureSource<'_>) -> Vec<(TopicId, Vec<Vec<Holder>>)> {
+fn lanes<'a>(source: &FigureSource<'a>) -> Vec<(TopicId, Vec<Vec<Holder<'a>>>)> {
     let rates = Rates::new(source.mission);
     let of = |topic: TopicId| {
-        let mut roles: BTreeMap<&Arc<str>, Vec<&Sender>> = BTreeMap::new();
-        for sender in rates.of_topic(topic) {
-            let node = sender
-                .node
-                .and_then(|id| source.mission.elements.nodes.get(id));
-            if let Some(node) = node {
-                roles.entry(&node.role).or_default().push(sender);
-            }
-        }
-        let holders = roles.into_iter().map(|(role, senders)| Holder {
-            role: Arc::clone(role),
-            times: Span::joined(
-                rates.of(&senders).iter().map(|piece| piece.span).collect(),
-                0,
-            ),
-        });
-        let mut holders: Vec<Holder> = holders.filter(|h| !h.times.is_empty()).collect();
-        holders.sort_by_key(Holder::start);
+        let holders = rates.holders(topic);
         let mut lanes: Vec<Vec<Holder>> = Vec::new();
         let many = holders.len();
         for holder in holders {
@@ -125,17 +85,14 @@ pub(crate) fn page(sheet: &FigureSheet<'_>) -> Result<Scene> {
         let (top, bottom) = (drawer.y(first), drawer.y(first + lanes.len() - 1));
         for gap in gaps(source.span(), Span::joined(all.collect(), 0)) {
             let lane = drawer.pitch * BAR;
-            hatch(
-                &mut canvas,
-                drawer.axis.rect(gap, top - lane / 2.0, bottom - top + lane),
-            );
+            canvas.hatch(drawer.axis.rect(gap, top - lane / 2.0, bottom - top + lane));
         }
         if first > 0 {
             let y = top - drawer.pitch / 2.0;
             let rule = Stroke::solid(ink::RULE, HAIRLINE);
             canvas.line(Point::new(0.0, y), Point::new(width, y), &rule);
         }
-        let roles = lanes.iter().flatten().map(|holder| &*holder.role);
+        let roles = lanes.iter().flatten().map(|holder| holder.role);
         let short: ShortNames = roles.collect();
         for (at, holders) in lanes.iter().enumerate() {
             let lane = Lane {
@@ -166,13 +123,13 @@ struct Lane<'a> {
 impl Lane<'_> {
     /// Draws the bars of holders one after the other, each with its name once: in its longest bar, else where there is
     /// room behind or before it.
-    fn draw(&self, canvas: &mut PaperCanvas<'_>, holders: &[Holder], names: &ShortNames<'_>) {
+    fn draw(&self, canvas: &mut PaperCanvas<'_>, holders: &[Holder<'_>], names: &ShortNames<'_>) {
         let axis = &self.drawer.axis;
         let high = self.drawer.pitch * BAR;
         let bar = |time: &Span| axis.rect(*time, self.y - high / 2.0, high);
         let start = axis.span.start;
         for (k, holder) in holders.iter().enumerate() {
-            let name = names.of(&holder.role);
+            let name = names.of(holder.role);
             let times = holder.times.iter().map(|time| {
                 let [from, to] = [time.start, time.end].map(|at| clock(at.since(start)));
                 format!("{from} to {to}")
@@ -238,23 +195,10 @@ fn gaps(whole: Span, times: Vec<Span>) -> Vec<Span> {
     gaps
 }
 
-/// Hatches a rectangle.
-fn hatch(canvas: &mut PaperCanvas<'_>, rect: Rect) {
-    let mut steps = Vec::new();
-    let mut at = HATCH / 2.0;
-    while at < rect.w + rect.h {
-        let right = (at - rect.w).max(0.0);
-        let left = (at - rect.h).max(0.0);
-        steps.push(Step::Move(Point::new(rect.x + at - right, rect.y + right)));
-        steps.push(Step::Line(Point::new(rect.x + left, rect.y + at - left)));
-        at += HATCH;
-    }
-    canvas.path(&steps, Color::NONE, &Stroke::solid(ink::RULE, HAIRLINE));
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::time::Stamp;
 
     #[test]
     fn nobody_holds_a_topic_between_its_senders() {

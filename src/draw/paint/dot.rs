@@ -15,7 +15,7 @@ use crate::evidence::Evidence;
 use crate::graph::{ById, Element, Elements, Id as _, State};
 use crate::layout::{self, Layout, Link, Orientation, Outline, Plan, Vertex};
 use crate::mission::Mission;
-use crate::view::{Arrow, ItemKind, Mark, Shown, ShownRuns, View};
+use crate::view::{Arrow, ArrowKind, ItemKind, Mark, Shown, ShownRuns, View};
 
 /// The font size of `qt_dotgraph`, in points; one point is one pixel of ours.
 const FONT: f64 = 11.0;
@@ -124,19 +124,20 @@ fn plan(view: &View, fonts: &Fonts) -> Plan {
             cluster: item.cluster,
         }
     });
-    let mut widest = ById::like(&view.arrows, None::<f64>);
+    let mut widest = ById::like(&view.arrows, None::<Size>);
     for shown in view.arrows_shown.iter().flat_map(ShownRuns::distinct) {
         let arrow = view.arrows.get(shown.arrow());
         let label = arrow.and_then(|arrow| label(arrow, shown));
         if let (Some(label), Some(most)) = (label, widest.get_mut(shown.arrow())) {
-            let lines = label.lines().map(width).fold(0.0, f64::max);
-            *most = Some(most.unwrap_or(0.0).max(lines));
+            let room = most.get_or_insert_default();
+            room.w = label.lines().map(width).fold(room.w, f64::max);
+            room.h = room.h.max(LINE * label.lines().count() as f64);
         }
     }
     let links = view.arrows.iter().zip(widest).map(|(arrow, widest)| Link {
         from: arrow.from.at(),
         to: arrow.to.at(),
-        label: widest.map(|w| Size::new(w + 8.0, LINE)),
+        label: widest.map(|room| Size::new(room.w + 8.0, room.h)),
         ..Link::default()
     });
     let clusters = view.namespaces.iter().map(|space| layout::Cluster {
@@ -148,6 +149,10 @@ fn plan(view: &View, fonts: &Fonts) -> Plan {
         vertices: vertices.collect(),
         links: links.collect(),
         clusters: clusters.collect(),
-        ..Plan::default()
+        // The labels of several topics between two nodes need space between their lines.
+        is_labelled: view
+            .arrows
+            .iter()
+            .any(|arrow| matches!(arrow.kind, ArrowKind::Direct(_))),
     }
 }

@@ -5,9 +5,8 @@ use std::collections::BTreeSet;
 
 use super::options;
 use super::page::GraphPen;
-use super::texts::{self, LINE, counting};
+use super::texts::{self, LINE, counting, short_name};
 use crate::base::geometry::{Point, Rect, Size};
-use crate::base::words::rate_change;
 use crate::draw::scene::{Anchor, Font, Group, Text};
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
@@ -38,12 +37,11 @@ pub(crate) struct Footer {
 pub(crate) fn footers(view: &View, style: &Style, fonts: &Fonts) -> Vec<Footer> {
     let footer = |also: &AlsoHere| {
         let space = also.cluster.and_then(|at| view.namespaces.get(at));
-        let short = |name: &str| {
-            let rest = space.and_then(|space| name.strip_prefix(&*space.name));
-            let rest = rest.and_then(|rest| rest.strip_prefix('/'));
-            fonts.shown(rest.unwrap_or(name)).into_owned()
+        let inside = space.map_or("", |space| &*space.name);
+        let short = |item: &Item| {
+            let name = fonts.shown(short_name(&item.label, inside));
+            counting(&name, item.counted.len())
         };
-        let short = |item: &Item| counting(short(&item.label), item);
         let names: Vec<String> = also.items.iter().map(short).collect();
         let size = style.edge.size;
         let all = names.iter().zip(&also.items).zip(&also.shown);
@@ -71,11 +69,8 @@ pub(crate) fn footers(view: &View, style: &Style, fonts: &Fonts) -> Vec<Footer> 
 
 /// A name with its annotations: the rate of a topic, and the sign of a change.
 fn said(item: &Item, shown: &Shown, name: &str) -> String {
-    let rate = match shown.rates {
-        _ if item.kind.word() == "node" || shown.mark == Some(Mark::Removed) => None,
-        Some((before, now)) => Some(rate_change(before, now)),
-        None => texts::rate_in(shown),
-    };
+    let is_rated = item.kind.word() != "node" && shown.mark != Some(Mark::Removed);
+    let rate = texts::rate_in(shown).filter(|_| is_rated);
     let name = rate.map_or_else(|| name.to_owned(), |rate| format!("{name} {rate}"));
     match shown.mark {
         Some(Mark::Added) => format!("+ {name}"),

@@ -28,8 +28,7 @@ pub(crate) struct ArrowPath {
     pub(crate) ends: [String; 2],
     /// The names of its topics as drawn, if it represents several.
     pub(crate) topics: Vec<String>,
-    start: Point,
-    curves: Vec<[Point; 3]>,
+    route: Route,
     /// The position of its label.
     label: Option<LabelPlace>,
     /// The middle of its badge.
@@ -53,7 +52,7 @@ impl LabelPlace {
     /// The position of a label in this space beside an arrow through these points.
     fn new(area: Rect, points: &[Point]) -> Self {
         let centre = area.centre();
-        let far = |p: &&Point| distance(**p, centre);
+        let far = |p: &&Point| p.distance(centre);
         let nearest = points.iter().min_by(|a, b| far(a).total_cmp(&far(b)));
         let side = match nearest {
             Some(p) if p.x <= area.x => Anchor::Start,
@@ -88,14 +87,9 @@ impl ArrowPath {
         room: Option<Size>,
         fit: GraphFit,
     ) -> Self {
-        let curves: Vec<[Point; 3]> = route
-            .curves
-            .iter()
-            .map(|c| c.map(|p| fit.point(p)))
-            .collect();
-        let start = fit.point(route.start);
-        let points = polyline(start, &curves, PIECES);
-        let length = points.windows(2).map(|w| distance(w[0], w[1])).sum();
+        let on_page = route.mapped(|p| fit.point(p));
+        let points = polyline(on_page.start, &on_page.curves, PIECES);
+        let length = points.windows(2).map(|w| w[0].distance(w[1])).sum();
         let area = route.label.zip(room).map(|(label, room)| {
             let room = Size::new(room.w * fit.scale, room.h * fit.scale);
             Rect::around(fit.point(label), room)
@@ -112,8 +106,7 @@ impl ArrowPath {
             id,
             ends,
             topics: Vec::new(),
-            start,
-            curves,
+            route: on_page,
             label,
             badge: *spots.first().unwrap_or(&at_part(&points, length, 0.5)),
             spots,
@@ -128,11 +121,11 @@ impl ArrowPath {
 
     /// Whether it runs down, or to the right.
     fn is_forward(&self, is_upright: bool) -> bool {
-        let end = self.curves.last().map_or(self.start, |curve| curve[2]);
+        let (start, end) = (self.route.start, self.tip().0);
         if is_upright {
-            end.y > self.start.y
+            end.y > start.y
         } else {
-            end.x > self.start.x
+            end.x > start.x
         }
     }
 
@@ -143,14 +136,15 @@ impl ArrowPath {
         let mut path = self.clone();
         path.label = Some(label);
         if !begins_inside {
-            path.turn();
+            path.route = path.route.backwards();
         }
         let is_inside = |p: Point| {
             frame.x <= p.x && p.x <= frame.right() && frame.y <= p.y && p.y <= frame.bottom()
         };
-        let starts = std::iter::once(path.start).chain(path.curves.iter().map(|curve| curve[2]));
+        let starts =
+            std::iter::once(path.route.start).chain(path.route.curves.iter().map(|curve| curve[2]));
         let curves = starts
-            .zip(&path.curves)
+            .zip(&path.route.curves)
             .map(|(from, c)| [from, c[0], c[1], c[2]]);
         let exits = curves.enumerate().filter_map(|(at, curve)| {
             let mut steps = (0..EXIT)
@@ -160,11 +154,11 @@ impl ArrowPath {
             Some((at, after(curve, part)))
         });
         let (at, [start, near, far, end]) = exits.last()?;
-        path.start = start;
-        path.curves.drain(..at);
-        *path.curves.first_mut()? = [near, far, end];
+        path.route.start = start;
+        path.route.curves.drain(..at);
+        *path.route.curves.first_mut()? = [near, far, end];
         if !begins_inside {
-            path.turn();
+            path.route = path.route.backwards();
         }
         let near = label.area.grown(NEAR);
         let pieces = path.points();
@@ -174,30 +168,23 @@ impl ArrowPath {
         pieces.any(|piece| piece.overlaps(&near)).then_some(path)
     }
 
-    /// Reverses it.
-    fn turn(&mut self) {
-        let points = self.curves.iter().flatten().copied();
-        let mut points: Vec<Point> = std::iter::once(self.start).chain(points).collect();
-        points.reverse();
-        self.start = points[0];
-        self.curves = points[1..]
-            .chunks_exact(3)
-            .map(|piece| [piece[0], piece[1], piece[2]])
-            .collect();
-    }
-
     /// Its end, and the direction in which it arrives there.
     fn tip(&self) -> (Point, Point) {
-        let Some([first, second, end]) = self.curves.last().copied() else {
-            return (self.start, direction(&[], self.start));
+        let Some([first, second, end]) = self.route.curves.last().copied() else {
+            return (self.route.start, direction(&[], self.route.start));
         };
-        let before = self.curves.iter().nth_back(1).map_or(self.start, |c| c[2]);
+        let before = self
+            .route
+            .curves
+            .iter()
+            .nth_back(1)
+            .map_or(self.route.start, |c| c[2]);
         (end, direction(&[before, first, second], end))
     }
 
     /// Points along it, close enough to be joined by straight lines.
     pub(super) fn points(&self) -> Vec<Point> {
-        polyline(self.start, &self.curves, PIECES)
+        polyline(self.route.start, &self.route.curves, PIECES)
     }
 }
 
@@ -246,13 +233,14 @@ impl GraphPen<'_> {
             _ => Tip::Arrow,
         };
         if arrow.kind == ArrowKind::Bundle {
-            self.line(&mut group, track, &look, tip, topics::uses(shown));
+            self.line(&mut group, track, &look, tip, shown.ways());
             self.rows(&mut over, track, shown, &look);
         } else {
             self.line(&mut group, track, &look, tip, [true, false]);
         }
+        // A rate that changed is shown even where there is no space beside the line.
         if let Some((text, is_badge)) = arrow_label(arrow, shown, ends[0])
-            && track.label.is_some()
+            && (is_badge || track.label.is_some())
         {
             self.label(&mut over, &text, is_badge, track, shown, &look);
         }
@@ -279,13 +267,13 @@ impl GraphPen<'_> {
         kind: Tip,
         heads: [bool; 2],
     ) {
-        let Some(first) = track.curves.first() else {
+        let Some(first) = track.route.curves.first() else {
             return;
         };
         let scale = self.fit.pen;
         let stroke = look.stroke.scaled(scale);
         let (end, along) = track.tip();
-        let against = direction(&[first[2], first[1], first[0]], track.start);
+        let against = direction(&[first[2], first[1], first[0]], track.route.start);
         let head = (self.style.edge.arrow + look.stroke.width) * scale;
         // The line ends inside the head, so that its blunt end is not visible beside the tip, and always at
         // the same point, regardless of its width.
@@ -293,7 +281,7 @@ impl GraphPen<'_> {
         let back = |from: Point, along: Point, by: f64| {
             Point::new(from.x - along.x * by, from.y - along.y * by)
         };
-        let (mut start, mut curves) = (track.start, track.curves.clone());
+        let (mut start, mut curves) = (track.route.start, track.route.curves.clone());
         if let Some(end) = curves.last_mut().filter(|_| heads[0]) {
             *end = [
                 end[0],
@@ -314,7 +302,7 @@ impl GraphPen<'_> {
             group.shape(Shape::line(path.clone(), Stroke::solid(look.glow, width)));
         }
         group.shape(Shape::line(path, stroke));
-        let tips = [(end, along), (track.start, against)];
+        let tips = [(end, along), (track.route.start, against)];
         for (tip, along) in tips
             .into_iter()
             .zip(heads)
@@ -325,7 +313,7 @@ impl GraphPen<'_> {
         if look.dot {
             let dot = Size::new(5.0 * scale, 5.0 * scale);
             group.shape(Shape::filled(
-                Form::Ellipse(Rect::around(track.start, dot)),
+                Form::Ellipse(Rect::around(track.route.start, dot)),
                 color,
             ));
         }
@@ -370,17 +358,17 @@ impl GraphPen<'_> {
         shown: &Shown,
         look: &ArrowLook,
     ) {
-        let Some(place) = track.label else { return };
         let text = self.fonts.shown(text);
         let style = &self.style.edge;
         let size = style.size * self.fit.scale;
         if is_badge {
             let paint = (look.stroke.color, self.style.badge.sign);
             let width = badge::label_width(self.fonts, &text, size);
-            let centre = place.middle(width);
+            let centre = track.label.map_or(track.badge, |place| place.middle(width));
             badge::label(group, self.fonts, paint, &text, centre, size);
             return;
         }
+        let Some(place) = track.label else { return };
         let edge = place.middle(style.halo_width * self.fit.scale);
         let (weight, color) = match shown.mark {
             Some(_) => (Weight::SemiBold, look.stroke.color),
@@ -431,7 +419,7 @@ impl Tip {
 /// The direction in which a curve reaches `end`: from its last control that differs from it.
 fn direction(controls: &[Point], end: Point) -> Point {
     for from in controls.iter().rev() {
-        let length = distance(*from, end);
+        let length = from.distance(end);
         if length > 0.01 {
             return Point::new((end.x - from.x) / length, (end.y - from.y) / length);
         }
@@ -439,15 +427,11 @@ fn direction(controls: &[Point], end: Point) -> Point {
     Point::new(1.0, 0.0)
 }
 
-fn distance(a: Point, b: Point) -> f64 {
-    libm::hypot(a.x - b.x, a.y - b.y)
-}
-
 /// The point at `part` (0..=1) of the curve.
 fn at_part(points: &[Point], length: f64, part: f64) -> Point {
     let mut left = length * part;
     for pair in points.windows(2) {
-        let step = distance(pair[0], pair[1]);
+        let step = pair[0].distance(pair[1]);
         if step >= left && step > 0.0 {
             let t = left / step;
             return Point::new(

@@ -91,7 +91,8 @@ impl GraphPen<'_> {
         let second = second_line(shown, card.shown_rates);
         let second =
             second.unwrap_or_else(|| card.label.silence(shown, card.shown_rates).to_owned());
-        self.lines(&mut group, &card.label, &second, inner, body, &look);
+        let words = [&*card.label.first(shown), &*second];
+        self.lines(&mut group, &card.label, words, inner, body, &look);
         if let Some(text) = rate_label(shown, card.shown_rates) {
             let (below, size) = self.below(place);
             let paint = (look.stroke.color, style.badge.sign);
@@ -213,7 +214,7 @@ impl GraphPen<'_> {
         &self,
         group: &mut Group,
         label: &Label,
-        second: &str,
+        [first, second]: [&str; 2],
         place: Rect,
         body: &Body,
         look: &BoxLook,
@@ -227,7 +228,7 @@ impl GraphPen<'_> {
             Text::new(Anchor::Middle, Point::new(middle.x, y), font, text)
         };
         let y = top + body.size * (LINE / 2.0 + 0.35) * scale;
-        group.text(line(y, body.size, body.weight(), look.text, &label.name));
+        group.text(line(y, body.size, body.weight(), look.text, first));
         for other in &label.others {
             top += body.size * LINE * scale;
             let y = top + body.size * (LINE / 2.0 + 0.35) * scale;

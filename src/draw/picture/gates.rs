@@ -63,14 +63,10 @@ pub(crate) fn gates(view: &View) -> Vec<Gate> {
 }
 
 /// The number of windows in which an element exists without a mark.
-fn quiet_windows(shown: &ShownRuns, windows: usize) -> usize {
-    let mut runs: Vec<(usize, bool)> = shown
-        .runs()
-        .map(|(window, look)| (window as usize, look.is_some_and(is_quiet)))
-        .collect();
-    runs.push((windows, false));
-    let quiet = runs.windows(2).filter(|pair| pair[0].1);
-    quiet.map(|pair| pair[1].0.saturating_sub(pair[0].0)).sum()
+fn quiet_windows(shown: &ShownRuns, windows: usize) -> u32 {
+    let runs = shown.spans(u32::try_from(windows).unwrap_or(u32::MAX));
+    let quiet = runs.filter(|(.., look)| is_quiet(look));
+    quiet.map(|(from, to, ..)| to - from).sum()
 }
 
 fn is_quiet(shown: &Shown) -> bool {

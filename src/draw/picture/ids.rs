@@ -63,8 +63,14 @@ pub(crate) fn data(item: &Item, shown: &Shown) -> Vec<(&'static str, String)> {
         ("state", shown.state.word().to_owned()),
     ];
     data.extend(shown.mark.map(|mark| ("mark", mark.word().to_owned())));
-    if !item.counted.is_empty() {
-        data.push(("topics", item.counted.join(" ")));
+    let counted: Vec<&str> = item
+        .counted
+        .iter()
+        .chain(&shown.unlined)
+        .map(|name| &**name)
+        .collect();
+    if !counted.is_empty() {
+        data.push(("topics", counted.join(" ")));
     }
     let members = shown.members.number();
     data.extend(members.map(|(number, _)| ("members", number.to_string())));

@@ -68,7 +68,9 @@ impl MeasuredGraph {
             let presence = view.presences.get(ItemId::of(at));
             label.has_bar = presence.is_some_and(|presence| !presence.times.is_empty());
             let has_rows = cards[at].room.h > 0.0;
-            let mut size = drafter.size(item, &label, seconds[at].unwrap_or(0.0), has_rows);
+            let first = drafter.longest_line(ItemId::of(at), &label);
+            let second = seconds[at].unwrap_or(0.0);
+            let mut size = drafter.size(item, &label, (&first, second), has_rows);
             if has_rows {
                 let room = cards[at].room;
                 cards[at].head = size.h;
@@ -172,8 +174,7 @@ impl Measurer<'_> {
     fn title(&self, space: &Space) -> Size {
         let size = self.style.cluster.size;
         let title = self.fonts.width(&space.title, size, Weight::SemiBold);
-        let badges = spaces::badges(space, self.fonts, size).pop();
-        let last = spaces::course(space, self.fonts, size).or(badges);
+        let last = spaces::badges(space, self.fonts, size).pop();
         let end = last.map_or(title, |(x, width)| x + width);
         Size::new(end, size * LINE)
     }
@@ -213,7 +214,8 @@ impl Measurer<'_> {
             others.push(format!("+{} more", item.others.len() - named));
         }
         Label {
-            name: counting(fit(&name, body.weight()), item),
+            name: fit(&name, body.weight()),
+            counted: item.counted.len(),
             others,
             second,
             has_bar: false,
@@ -221,11 +223,25 @@ impl Measurer<'_> {
         }
     }
 
-    /// The size of a box with this label, whose changing smaller lines are at most `second` wide; for one
-    /// with rows, that of the part above them.
-    fn size(&self, item: &Item, label: &Label, second: f64, has_rows: bool) -> Size {
+    /// The longest first line of a box.
+    fn longest_line(&self, id: ItemId, label: &Label) -> String {
+        let looks = self.view.items_shown.get(id);
+        let looks = looks.map_or(&[][..], ShownRuns::distinct).iter();
+        let unlined = looks.map(|look| look.unlined.len()).max();
+        counting(&label.name, label.counted + unlined.unwrap_or(0))
+    }
+
+    /// The size of a box with this label, whose longest first line is `first` and whose changing smaller lines are at most
+    /// `second` wide; for one with rows, that of the part above them.
+    fn size(
+        &self,
+        item: &Item,
+        label: &Label,
+        (first, second): (&str, f64),
+        has_rows: bool,
+    ) -> Size {
         let body = options::body(self.style, item.kind);
-        let width = self.fonts.width(&label.name, body.size, body.weight());
+        let width = self.fonts.width(first, body.size, body.weight());
         let others = label.others.iter();
         let others = others.map(|name| self.fonts.width(name, body.size, Weight::Regular));
         let width = others.fold(width.max(second), f64::max);

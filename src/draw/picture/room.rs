@@ -23,11 +23,12 @@ pub(super) fn place_titles(
     scale: f64,
 ) -> Vec<(Point, Rect)> {
     let few = if tracks.len() > MOST { &[] } else { tracks };
-    let mut lines: Vec<Vec<Point>> = few.iter().map(ArrowPath::points).collect();
-    lines.extend(titles.iter().map(|(frame, ..)| border(frame)));
+    let lines: Vec<Vec<Point>> = few.iter().map(ArrowPath::points).collect();
     let pieces = lines.iter().flat_map(|line| line.windows(2));
     let pieces = pieces.filter_map(|ends| Rect::of_points(ends.iter().copied()));
+    let borders = titles.iter().flat_map(|(frame, ..)| border(frame));
     let taken: Vec<Rect> = pieces
+        .chain(borders)
         .chain(few.iter().filter_map(ArrowPath::label_area))
         .chain(cards.iter().map(|card| card.place))
         .collect();
@@ -59,18 +60,13 @@ pub(super) fn place_titles(
     placed.collect()
 }
 
-/// The border of a frame.
-fn border(frame: &Rect) -> Vec<Point> {
-    let (left, right) = (frame.x, frame.right());
-    let (top, bottom) = (frame.y, frame.bottom());
-    let corners = [
-        (left, top),
-        (right, top),
-        (right, bottom),
-        (left, bottom),
-        (left, top),
-    ];
-    corners.map(|(x, y)| Point::new(x, y)).to_vec()
+/// The four lines of the border of a frame.
+fn border(frame: &Rect) -> [Rect; 4] {
+    let left = Rect::new(frame.x, frame.y, 0.0, frame.h);
+    let top = Rect::new(frame.x, frame.y, frame.w, 0.0);
+    let across = Point::new(frame.w, 0.0);
+    let down = Point::new(0.0, frame.h);
+    [left, top, left.moved(across), top.moved(down)]
 }
 
 /// Moves all badges of this radius to positions at which they cover no line, title or other box, if possible;
@@ -151,9 +147,8 @@ impl Room {
 
 /// The rectangle around points, at least a pixel wide and high.
 fn around(points: &[Point]) -> Rect {
-    let of = |p: &Point| Rect::around(*p, Size::new(1.0, 1.0));
-    let all = points.iter().map(of);
-    all.reduce(|a, b| a.union(&b)).unwrap_or_default()
+    let all = Rect::of_points(points.iter().copied());
+    all.unwrap_or_default().grown(0.5)
 }
 
 /// The distance of a point from the line between two others.

@@ -1,12 +1,12 @@
 //! The frames of namespaces: their titles, the time of their first content, and the member lists of equal namespaces that are
-//! drawn as one: a badge for each, and their number over time.
+//! drawn as one: a badge for each.
 
 use super::page::GraphPen;
 use crate::base::geometry::{Point, Rect};
-use crate::draw::scene::{Anchor, Font, Form, Group, Shape, Step, Stroke, Text, line};
+use crate::draw::scene::{Anchor, Font, Form, Group, Shape, Stroke, Text};
 use crate::draw::style::Color;
 use crate::draw::text::{Fonts, Weight};
-use crate::view::{MemberState, View};
+use crate::view::{MemberState, Namespace, View};
 
 /// A namespace with a box around its members.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,39 +17,24 @@ pub(crate) struct Space {
     pub(crate) title: String,
     /// The indices of the equal namespaces drawn as this one; empty for a single one.
     pub(crate) replicas: Vec<String>,
-    /// Their number over time, if it changes: fractions of the time from 0 to 1, each with the share of them
-    /// that exists from then on.
-    pub(crate) course: Vec<(f64, f64)>,
 }
 
 /// The titles of the namespaces: the part of their names inside the namespace around them.
 pub(crate) fn spaces(view: &View, fonts: &Fonts) -> Vec<Space> {
-    let title = |at: usize| {
-        let name = &*view.namespaces[at].name;
-        let around = view.namespaces[at]
-            .parent
-            .and_then(|p| view.namespaces.get(p));
-        around.map_or(name, |p| name.strip_prefix(&*p.name).unwrap_or(name))
-    };
-    let mut fleets = 0..;
-    (0..view.namespaces.len())
-        .map(|at| Space {
-            course: Some(at)
-                .filter(|&at| !view.namespaces[at].replicas.is_empty())
-                .and_then(|_| fleets.next())
-                .map_or_else(Vec::new, |nth| shares(view, nth)),
-            name: view.namespaces[at].name.to_string(),
-            title: match view.namespaces[at].replicas.len() {
-                0 => fonts.shown(title(at)).into_owned(),
-                n => format!("{} × {n}", fonts.shown(title(at))),
+    let space = |space: &Namespace| {
+        let around = space.parent.and_then(|at| view.namespaces.get(at));
+        let around = around.map_or("", |around| &*around.name);
+        let title = fonts.shown(space.name.strip_prefix(around).unwrap_or(&space.name));
+        Space {
+            name: space.name.to_string(),
+            title: match space.replicas.len() {
+                0 => title.into_owned(),
+                n => format!("{title} × {n}"),
             },
-            replicas: view.namespaces[at]
-                .replicas
-                .iter()
-                .map(ToString::to_string)
-                .collect(),
-        })
-        .collect()
+            replicas: space.replicas.iter().map(ToString::to_string).collect(),
+        }
+    };
+    view.namespaces.iter().map(space).collect()
 }
 
 /// The first window in which each namespace has content.
@@ -88,63 +73,6 @@ const MOST_BADGES: usize = 32;
 /// line.
 const BADGE_TEXT: f64 = 0.8;
 
-/// The width of the line of their number over time, relative to the font size of the title: as wide as a name of usual
-/// length, so that it does not widen the namespace.
-const COURSE: f64 = 6.0;
-
-/// The left edge and the width of the line of their number over time, relative to the title; `None` if it
-/// does not change.
-pub(crate) fn course(space: &Space, fonts: &Fonts, size: f64) -> Option<(f64, f64)> {
-    if space.course.len() < 2 {
-        return None;
-    }
-    let title = fonts.width(&space.title, size, Weight::SemiBold);
-    let end = badges(space, fonts, size).pop();
-    let end = end.map_or(title, |(x, width)| x + width);
-    Some((end + size * 0.7, size * COURSE))
-}
-
-/// The share of the equal namespaces of one kind that exist at the end of each window, where it changes.
-pub(crate) fn shares(view: &View, nth: usize) -> Vec<(f64, f64)> {
-    let mut shares: Vec<(f64, f64)> = Vec::new();
-    for (k, frame) in view.frames.iter().enumerate() {
-        let Some(who) = frame.member_lists.get(nth).filter(|who| !who.is_empty()) else {
-            continue;
-        };
-        let here = who.iter().filter(|who| who.is_here()).count();
-        let share = here as f64 / who.len() as f64;
-        if shares
-            .last()
-            .is_none_or(|last| (last.1 - share).abs() > 1e-9)
-        {
-            shares.push((view.place_in_time(k), share));
-        }
-    }
-    shares
-}
-
-/// A line in steps, as high as the share at each time.
-fn steps(course: &[(f64, f64)], area: &Rect) -> Form {
-    let y = |share: f64| area.bottom() - share * area.h;
-    let mut steps: Vec<Step> = Vec::new();
-    let mut before = None;
-    for &(at, share) in course {
-        let x = area.x + at * area.w;
-        match before {
-            None => steps.push(Step::Move(Point::new(x, y(share)))),
-            Some(before) => {
-                steps.push(Step::Line(Point::new(x, y(before))));
-                steps.push(Step::Line(Point::new(x, y(share))));
-            }
-        }
-        before = Some(share);
-    }
-    if let Some(last) = before {
-        steps.push(Step::Line(Point::new(area.right(), y(last))));
-    }
-    Form::Path(steps)
-}
-
 impl GraphPen<'_> {
     /// The badges of several equal namespaces: one for each, filled while it exists, in the colour of its
     /// change.
@@ -154,7 +82,6 @@ impl GraphPen<'_> {
         place: Rect,
         by: Point,
         id: &str,
-        now: f64,
         who: &[MemberState],
     ) -> Group {
         let size = self.style.cluster.size;
@@ -174,15 +101,6 @@ impl GraphPen<'_> {
         let badges = badges(space, self.fonts, size);
         for ((index, who), place) in space.replicas.iter().zip(who).zip(badges) {
             self.member(&mut group, index, *who, area(place));
-        }
-        if let Some(place) = course(space, self.fonts, size) {
-            let area = area(place);
-            let color = self.style.cluster.text;
-            let pen = |width| Stroke::solid(color, width).scaled(self.fit.pen);
-            group.shape(Shape::line(steps(&space.course, &area), pen(1.2)));
-            let at = area.x + now * area.w;
-            let head = line(Point::new(at, area.y), Point::new(at, area.bottom()));
-            group.shape(Shape::line(head, pen(2.0)));
         }
         group
     }

@@ -16,7 +16,7 @@ pub(super) struct Spotlight<'a> {
     /// The boxes that changed, or list something that did.
     news: BTreeSet<ItemId>,
     /// These, and those at the other ends of their lines and of lines that changed.
-    lit: BTreeSet<ItemId>,
+    pub(super) lit: BTreeSet<ItemId>,
 }
 
 impl<'a> Spotlight<'a> {
@@ -58,11 +58,6 @@ impl<'a> Spotlight<'a> {
             || [arrow.from, arrow.to]
                 .iter()
                 .any(|end| self.news.contains(end))
-    }
-
-    /// Whether a box has.
-    pub(super) fn has_box(&self, item: ItemId) -> bool {
-        self.lit.contains(&item)
     }
 
     /// The group in paler colours.

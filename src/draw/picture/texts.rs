@@ -1,6 +1,6 @@
 //! The words on the picture: badges with counts, labels of boxes and arrows, and facts about an element.
 
-use crate::base::words::{count, counted, rate, rate_change, rate_of, rates};
+use crate::base::words::{count, counted, rate, rate_of, rates};
 use crate::draw::style::Body;
 use crate::graph::{ById, State};
 use crate::view::{Arrow, ArrowKind, Counts, Item, ItemKind, Shown, View};
@@ -65,11 +65,21 @@ pub(crate) fn inside(counts: &Counts) -> String {
     reported.collect::<Vec<_>>().join(", ")
 }
 
-/// The rate that is written, with no more digits than its number of messages justifies; `None` for none.
+/// The rate that is written, with no more digits than its number of messages justifies, and the new sender of a topic that
+/// was handed over; `None` for no rate.
 pub(crate) fn rate_in(shown: &Shown) -> Option<String> {
-    if shown.steps.len() > 1 && shown.each < 2 {
-        return Some(rates(&shown.steps));
-    }
+    let rate = match &shown.steps[..] {
+        [_, _, ..] if shown.each < 2 => rates(&shown.steps),
+        _ => plain_rate(shown)?,
+    };
+    Some(match &shown.sender {
+        Some(sender) => format!("{rate} by {sender}"),
+        None => rate,
+    })
+}
+
+/// The same without changes in the window.
+pub(crate) fn plain_rate(shown: &Shown) -> Option<String> {
     let (hz, count) = shown.written_rate();
     measured(shown, hz, count)
 }
@@ -103,9 +113,9 @@ pub(crate) fn facts(shown: &Shown) -> String {
     if let Some(mark) = shown.mark {
         parts.insert(0, mark.class().to_owned());
     }
-    match shown.rates {
-        Some((from, to)) => parts.push(rate_change(from, to)),
-        None => parts.extend(measured(shown, shown.hz, shown.count)),
+    match &shown.steps[..] {
+        [_, _, ..] => parts.push(rates(&shown.steps)),
+        _ => parts.extend(measured(shown, shown.hz, shown.count)),
     }
     if let Some(n) = shown.count.filter(|n| *n > 0) {
         parts.push(count(n, "message"));
@@ -138,6 +148,8 @@ pub(crate) const TICK: f64 = 1.7;
 pub(crate) struct Label {
     /// The name as drawn.
     pub(crate) name: String,
+    /// The number of topics that are counted beside it in every window.
+    pub(crate) counted: usize,
     /// The names of other nodes in the box, below it.
     pub(crate) others: Vec<String>,
     /// Whether a smaller line is drawn below it in some window.
@@ -157,6 +169,11 @@ impl Label {
             0.0
         };
         self.lines(body) + bar
+    }
+
+    /// The first line in a window.
+    pub(crate) fn first(&self, shown: &Shown) -> String {
+        counting(&self.name, self.counted + shown.unlined.len())
     }
 
     /// The height of its lines without the bar.
@@ -179,9 +196,9 @@ impl Label {
 pub(crate) const NO_MESSAGE: &str = "no msg";
 
 /// A name with the number of topics that are only counted: `imu_driver +2`.
-pub(crate) fn counting(name: String, item: &Item) -> String {
-    match item.counted.len() {
-        0 => name,
+pub(crate) fn counting(name: &str, more: usize) -> String {
+    match more {
+        0 => name.to_owned(),
         more => format!("{name} +{more}"),
     }
 }
@@ -227,10 +244,10 @@ pub(crate) fn arrow_label(
     let topic = arrow
         .carries(shown)
         .map_or_else(String::new, |t| t + called);
-    if let Some((before, now)) = shown.rates.filter(|_| arrow.kind != ArrowKind::Bundle) {
-        return Some((topic + &rate_change(before, now), true));
-    }
     let rate = rate_in(shown);
+    if shown.has_new_rate() && arrow.kind != ArrowKind::Bundle {
+        return rate.map(|rate| (topic + &rate, true));
+    }
     match arrow.kind {
         ArrowKind::Publish => rate.map(|rate| (rate, false)),
         ArrowKind::Subscribe => {
@@ -262,17 +279,13 @@ pub(crate) fn second_line(shown: &Shown, shown_rates: ShownRates) -> Option<Stri
     if let Some(state) = &shown.lifecycle {
         return Some(state.to_string());
     }
-    match (shown_rates, shown.rates) {
-        (ShownRates::Nothing | ShownRates::Changes, _) => None,
-        (ShownRates::Rates, Some((before, now))) => Some(rate_change(before, now)),
-        (ShownRates::Rates, None) => rate_in(shown),
-    }
+    rate_in(shown).filter(|_| shown_rates == ShownRates::Rates)
 }
 
 /// The rate label of a box in one window: the rate that changed, if neither an arrow nor its smaller line shows it.
 pub(crate) fn rate_label(shown: &Shown, shown_rates: ShownRates) -> Option<String> {
-    let (before, now) = shown.rates.filter(|_| shown_rates == ShownRates::Changes)?;
-    Some(rate_change(before, now))
+    let is_new = shown_rates == ShownRates::Changes && shown.has_new_rate();
+    rate_in(shown).filter(|_| is_new)
 }
 
 /// The part of a name inside the namespace in whose box it is drawn.

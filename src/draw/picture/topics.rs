@@ -118,7 +118,7 @@ fn relative<'a>(view: &View, arrow: &Arrow, name: &'a str) -> &'a str {
 /// The rows of a line in a window: up to four topics have one each, changed ones first, then by rate; of
 /// more, the changed ones or the one with the highest rate, with the number of the others.
 pub(crate) fn rows(shown: &Shown, names: &[String]) -> Vec<Row> {
-    let both = uses(shown) == [true, true];
+    let both = shown.ways() == [true, true];
     let changed = shown.topics.iter().filter(|row| row.mark.is_some()).count();
     let all = shown.topics.len();
     let most = if all <= MOST {
@@ -174,18 +174,9 @@ pub(crate) fn called(name: &str) -> String {
     format!("{name}()")
 }
 
-/// Whether messages run along a line, and whether against it.
-pub(crate) fn uses(shown: &Shown) -> [bool; 2] {
-    let any = |way: usize| shown.topics.iter().any(|row| row.ways[way]);
-    [any(0), any(1)]
-}
-
 /// The rate of a topic in words, or the reason for none; none for an action, whose topics each have one.
 fn rate(row: &TopicRow) -> Option<String> {
-    if let Some((before, now)) = row.rates {
-        return Some(words::rate_change(before, now));
-    }
-    if row.steps.len() > 1 && row.ways != [true, true] {
+    if row.steps.len() > 1 && (row.mark.is_some() || row.ways != [true, true]) {
         return Some(words::rates(&row.steps));
     }
     if row.is_starved {

@@ -54,7 +54,12 @@ pub struct UnionElement {
 /// The rate of an element in a window as drawn, after the topics that an arrow between nodes carries; empty
 /// for none.
 pub fn rate_label(shown: &Shown, arrow: Option<&Arrow>) -> String {
-    let rate = texts::rate_in(shown).unwrap_or_default();
+    // What changes in a window is written once, not as long as the rate is the same.
+    let rate = match shown.mark {
+        Some(_) => texts::plain_rate(shown),
+        None => texts::rate_in(shown),
+    };
+    let rate = rate.unwrap_or_default();
     match arrow.and_then(|arrow| arrow.carries(shown)) {
         Some(topic) => format!("{topic} {rate}").trim_end().to_owned(),
         _ => rate,

@@ -174,3 +174,23 @@ fn everything_is_on_the_page() {
         }
     }
 }
+
+/// The upright box around a piece; for a text only its height and beginning.
+fn piece_bounds(piece: &Piece) -> Option<Rect> {
+    match piece {
+        Piece::Shape(shape) => match &shape.form {
+            Form::Rect(rect, _) | Form::Ellipse(rect) => Some(*rect),
+            Form::Path(steps) => Rect::of_points(
+                steps
+                    .iter()
+                    .filter_map(|step| step.points().last().copied()),
+            ),
+        },
+        Piece::Text(text) => Some(Rect::new(
+            text.at.x,
+            text.at.y - text.size,
+            0.0,
+            text.size * 1.3,
+        )),
+    }
+}

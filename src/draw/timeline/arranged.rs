@@ -12,6 +12,7 @@ use crate::base::words;
 use crate::graph::NodeId;
 use crate::mission::EventId;
 use crate::mission::event_log::Event;
+use crate::mission::rates::same;
 
 /// The part of the mission, one in this many, up to which starts count as one burst of the staircase.
 const BURST: i64 = 66;
@@ -77,6 +78,38 @@ pub(crate) fn by_namespace(rows: Vec<Row>, whole: Span, is_folded: bool) -> Vec<
             all.extend(staircase(open, whole));
         } else {
             all.extend(staircase([fixed, open].concat(), whole));
+        }
+    }
+    all
+}
+
+/// The same rows, but topics of one type that are sent alike and whose names differ only in the number at their end are one:
+/// `ls0…7 ×8`.
+pub(crate) fn numbered(rows: Vec<Row>, whole: Span) -> Vec<Row> {
+    let near = whole.nanos() / NEAR;
+    let numbered = |row: Row| {
+        let stem = row.name.trim_end_matches(|c: char| c.is_ascii_digit());
+        let number = row.name[stem.len()..].parse::<u32>().ok();
+        (stem.to_owned(), number, row)
+    };
+    let mut rows: Vec<_> = rows.into_iter().map(numbered).collect();
+    rows.sort_by(|a, b| (&a.0, a.1).cmp(&(&b.0, b.1)));
+    let mut all = Vec::new();
+    for alike in rows.chunk_by(|a, b| a.0 == b.0 && a.2.is_like(&b.2, near)) {
+        match alike {
+            [(stem, Some(first), row), .., (_, Some(last), _)] if alike.len() >= FEWEST_FOLDED => {
+                let name = format!("{stem}{first}…{last} ×{}", alike.len()).into();
+                let mut one = Row {
+                    name,
+                    ..row.clone()
+                };
+                for (.., other) in &alike[1..] {
+                    let marks = one.marks.iter_mut().zip(&other.marks);
+                    marks.for_each(|(mark, other)| mark.events.extend_from_slice(&other.events));
+                }
+                all.push(one);
+            }
+            _ => all.extend(alike.iter().map(|(.., row)| row.clone())),
         }
     }
     all
@@ -191,6 +224,20 @@ pub(crate) fn together(
 }
 
 impl Row {
+    /// Whether it is of the same type as another and sent at the same times and rates, nearly.
+    fn is_like(&self, other: &Self, near: i64) -> bool {
+        let is_same = |(a, b): (&SendingBar, &SendingBar)| {
+            let ends = [(a.span.start, b.span.start), (a.span.end, b.span.end)];
+            ends.iter().all(|(a, b)| a.since(*b).abs() <= near)
+        };
+        self.beside == other.beside
+            && self.marks.len() == other.marks.len()
+            && self.is_with(other, near)
+            && self.hz.zip(other.hz).is_some_and(|(a, b)| same(a, b))
+            && self.bars.len() == other.bars.len()
+            && self.bars.iter().zip(&other.bars).all(is_same)
+    }
+
     /// Whether it begins and ends as often as another row, each time nearly at the same time.
     fn is_with(&self, other: &Self, near: i64) -> bool {
         let is_same =

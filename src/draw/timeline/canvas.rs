@@ -15,6 +15,8 @@ const LONGEST: usize = 1000;
 pub(crate) const PX_PER_MM: f64 = 96.0 / 25.4;
 /// Millimetres per point.
 pub(crate) const MM_PER_PT: f64 = 25.4 / 72.0;
+/// The distance of the lines of a hatching in millimetres: the eye sees an area, not lines.
+const HATCH: f64 = 1.1;
 /// The thinnest line in millimetres: 0.5 pt, as printers require.
 pub(crate) const HAIRLINE: f64 = 0.18;
 
@@ -263,6 +265,23 @@ impl<'a> PaperCanvas<'a> {
         let form = Form::Path(steps.iter().map(|step| step.mapped(at)).collect());
         let stroke = stroke.scaled(self.scale);
         self.shape(Shape::new(form, fill, stroke));
+    }
+
+    /// Hatches a rectangle; one that is narrower than the distance of the lines is filled.
+    pub(crate) fn hatch(&mut self, rect: Rect) {
+        if rect.w < HATCH {
+            return self.fill(rect, ink::RULE);
+        }
+        let mut steps = Vec::new();
+        let mut at = HATCH / 2.0;
+        while at < rect.w + rect.h {
+            let right = (at - rect.w).max(0.0);
+            let left = (at - rect.h).max(0.0);
+            steps.push(Step::Move(Point::new(rect.x + at - right, rect.y + right)));
+            steps.push(Step::Line(Point::new(rect.x + left, rect.y + at - left)));
+            at += HATCH;
+        }
+        self.path(&steps, Color::NONE, &Stroke::solid(ink::RULE, HAIRLINE));
     }
 
     /// Draws a filled head of an arrow that ends at `tip`, coming from `from`.

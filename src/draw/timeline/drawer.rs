@@ -30,6 +30,8 @@ const LETTER: f64 = 1.08 / 2.75;
 const APART: f64 = 2.3;
 /// The least width of a page with a column beside the rows, in millimetres.
 const WIDE: f64 = 150.0;
+/// The least share of a page that the time takes beside the types of topics.
+const LEAST_TIME: f64 = 0.45;
 /// The most names that are written for a row, and beside it.
 const MOST_NAMES: (usize, usize) = (3, 12);
 
@@ -117,7 +119,7 @@ impl PhaseLabel {
             Some(name) => name.clone(),
             None => canvas.cut(self.names.last().map_or("", |n| n), bold, room),
         };
-        let letters = name.chars().filter(|c| c.is_alphanumeric()).count();
+        let letters = name.chars().filter(|c| c.is_alphabetic()).count();
         if letters >= FEWEST_LETTERS || self.names.contains(&name) {
             let at = cell.centre();
             canvas.text_middle(at.x, at.y, of, color, &name);
@@ -126,7 +128,7 @@ impl PhaseLabel {
 }
 
 /// As many of `names` as fit, `a, b, +3`; the first alone if none do.
-fn fitting(names: &[String], most: usize, fits: impl Fn(&str) -> bool) -> String {
+pub(crate) fn fitting(names: &[String], most: usize, fits: impl Fn(&str) -> bool) -> String {
     let text = |named: usize| {
         let text = names[..named].join(", ");
         match names.len() - named {
@@ -196,13 +198,20 @@ impl Drawer {
         place: Rect,
     ) -> Self {
         // The largest width of names, and the widths of rates and of what is beside the rows.
-        let (most, rates, mut beside) = match density {
+        let (most, mut rates, mut beside) = match density {
             Density::Frame => (place.w * 0.22, 0.0, 0.0),
             // Only band and axis, below a map.
             _ if timeline.rows.is_empty() => (0.0, 0.0, 0.0),
             Density::Page => (place.w.min(WIDE) * 0.36, 12.0, 58.0),
             Density::Paper => (place.w.min(WIDE) * 0.36, 5.1, 68.0),
         };
+        if density == Density::Page {
+            let width = |text: String| canvas.width(&text, Type::Small) + 1.4;
+            let written = timeline.rows.iter().filter_map(Row::rates);
+            rates = written.map(width).fold(rates, f64::max);
+            let types = timeline.rows.iter().map(|row| row.beside[1].join(", "));
+            beside = types.map(width).fold(0.0, f64::max).min(beside);
+        }
         if place.w < WIDE {
             beside = 0.0;
         }
@@ -214,6 +223,11 @@ impl Drawer {
         let names = timeline.rows.iter().map(one).fold(0.0, f64::max) + GAP;
         let heads = ["min:s", "phase"].map(|head| canvas.width(head, Type::Small) + 1.0);
         let left = place.x + names.min(most).max(heads[0]).max(heads[1]);
+        // On a page, the types of topics give way to the time.
+        let time = place.right() - beside - rates - left;
+        if density == Density::Page && time < LEAST_TIME * place.w {
+            beside = 0.0;
+        }
         let end = place.right() - beside - if beside > 0.0 { 1.8 } else { 0.0 };
         Self {
             density,
@@ -241,12 +255,8 @@ impl Drawer {
     /// The y at which the rows begin.
     fn begin(&self) -> f64 {
         let has_band = !self.timeline.phases.is_empty();
-        self.top
-            + if has_band {
-                BAND.0 + self.gap(BAND.1)
-            } else {
-                0.0
-            }
+        let band = BAND.0 + self.gap(BAND.1);
+        self.top + if has_band { band } else { 0.0 }
     }
 
     /// The y at which the rows end, at the axis.
@@ -303,18 +313,9 @@ impl Drawer {
                 );
             }
         }
-        let holes = self
-            .timeline
-            .interruptions
-            .iter()
-            .filter_map(Interruption::hole);
-        for hole in holes {
-            let color = if hole.nanos() > 0 {
-                ink::BAND[0]
-            } else {
-                ink::RULE
-            };
-            canvas.fill(self.axis.rect(hole, top, bottom - top), color);
+        let interruptions = self.timeline.interruptions.iter();
+        for hole in interruptions.filter_map(Interruption::hole) {
+            canvas.hatch(self.axis.rect(hole, top, bottom - top));
         }
         for (k, phase) in phases.iter().enumerate() {
             let cell = self.axis.rect(phase.span, self.top, BAND.0);
@@ -333,11 +334,8 @@ impl Drawer {
         if let Some(right) = self.rates.filter(|_| is_paper) {
             canvas.text_end(right, head, small, quiet, "Hz");
         }
-        let is_of_nodes = self
-            .timeline
-            .rows
-            .iter()
-            .any(|row| !row.beside[0].is_empty());
+        let mut rows = self.timeline.rows.iter();
+        let is_of_nodes = rows.any(|row| !row.beside[0].is_empty());
         if let Some((x, _)) = self.beside.filter(|_| is_of_nodes) {
             let text = "→ publishes  ← subscribes, as far as known";
             canvas.text(x, head, small, quiet, text);

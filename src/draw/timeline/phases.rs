@@ -40,6 +40,10 @@ pub(crate) fn named(source: &FigureSource<'_>) -> Vec<PhaseLabel> {
                 let sign: String = count.chars().take(1).collect();
                 shorter(&sign, those, phase.nodes_added.max(phase.nodes_removed))
             }
+            None if k == 0 && !source.is_named => {
+                let names = [&*phase.name, "start"].map(str::to_owned);
+                names[usize::from(phase.nodes_added == 0)..].to_vec()
+            }
             None => vec![phase.name.to_string()],
         };
         phases.push(PhaseLabel {

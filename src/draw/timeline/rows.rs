@@ -8,10 +8,11 @@ use super::marks::{RowMark, marked};
 use super::source::FigureSource;
 use crate::base::name::namespace;
 use crate::base::time::{Span, Stamp};
+use crate::base::words;
 use crate::evidence::Confidence;
 use crate::graph::history::Sender;
 use crate::graph::{ById, EdgeId, Element, NodeId, TopicId};
-use crate::mission::rates::{Piece, Rates, silence};
+use crate::mission::rates::{Piece, Rates, silence, steps};
 
 /// An interval of publishing at one rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +57,8 @@ pub(crate) struct Row {
     pub(crate) bars: Vec<SendingBar>,
     /// Messages per second while it publishes; `None` if it never does, or if that is unknown.
     pub(crate) hz: Option<f64>,
+    /// Its rates in order, if there are several.
+    pub(crate) steps: Vec<f64>,
     /// Its events, in order of the log.
     pub(crate) marks: Vec<RowMark>,
     /// The names before it, of which as many as fit are written.
@@ -81,6 +84,14 @@ impl Row {
     pub(crate) fn is_in(&self, time: Span) -> bool {
         let shared = |life: &Span| life.start < time.end && time.start < life.end;
         self.lives.iter().any(shared)
+    }
+
+    /// Its rates while it publishes, in words: `10 → 5 → 10 Hz`.
+    pub(crate) fn rates(&self) -> Option<String> {
+        match &self.steps[..] {
+            [] => self.hz.map(words::rate),
+            steps => Some(words::rates(steps)),
+        }
     }
 
     /// The node or the topic of the row; `None` for a title.
@@ -178,6 +189,7 @@ fn row(
         is_inferred: senders.is_empty() && confidence.is_some_and(|c| c >= Confidence::Inferred),
         bars,
         hz,
+        steps: steps(&pieces),
         ..Row::default()
     }
 }

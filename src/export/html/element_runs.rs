@@ -203,8 +203,8 @@ impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
                 });
                 life.rates.push(window, *place, 0);
             }
-            if let Some((before, now)) = shown.rates {
-                let value = self.labels.place(words::rate_change(before, now));
+            if shown.has_new_rate() {
+                let value = self.labels.place(words::rates(&shown.steps));
                 life.turns.0.push((window, value));
             }
             let members = shown

@@ -18,9 +18,14 @@ const MOST_CHART: usize = 45_000;
 /// The most edges of an expanded chart; larger ones are collapsed.
 const MOST_EDGES_OPEN: usize = 25;
 
-/// The chart of what changed, with its legend; nothing without changes.
-pub(super) fn chart(view: &View) -> String {
-    let Some((seen, left_out)) = changed(view) else {
+/// The chart of what changed, with its legend; nothing without changes. One with many edges is of `paired`, if that is given.
+pub(super) fn chart<'a>(mut view: &'a View, paired: Option<&'a View>) -> String {
+    let mut found = changed(view);
+    let is_large = |(seen, _): &(SeenWindow, usize)| seen.arrows.len() > mermaid::MANY;
+    if let Some(paired) = paired.filter(|_| found.as_ref().is_some_and(is_large)) {
+        (view, found) = (paired, changed(paired));
+    }
+    let Some((seen, left_out)) = found else {
         return String::new();
     };
     // The picture's style may be dark, but Markdown has any background.
@@ -52,21 +57,16 @@ pub(super) fn chart(view: &View) -> String {
 /// only at the start, else as changed if it ever changed.
 pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
     let last = view.frames.len().checked_sub(1)?;
-    let items = ends(&view.items_shown, last);
-    let arrows = ends(&view.arrows_shown, last);
+    let mut items = ends(&view.items_shown, last);
+    let mut arrows = ends(&view.arrows_shown, last);
     let is_changed =
         |ends: &BTreeMap<u32, Shown>, id: u32| ends.get(&id).is_some_and(|s| s.mark.is_some());
-    let mut wanted: Vec<(u8, ArrowId)> = Vec::new();
+    let mut wanted: Vec<(bool, ArrowId)> = Vec::new();
     for (id, arrow) in view.arrows.with_ids() {
-        let ends = [arrow.from, arrow.to]
-            .iter()
-            .filter(|end| is_changed(&items, end.0))
-            .count();
-        let own = is_changed(&arrows, id.0);
-        match (own, ends) {
-            (false, 0) => {}
-            (true, _) => wanted.push((0, id)),
-            (false, _) => wanted.push((1, id)),
+        let is_beside = !is_changed(&arrows, id.0);
+        let mut ends = [arrow.from, arrow.to].into_iter();
+        if !is_beside || ends.any(|end| is_changed(&items, end.0)) {
+            wanted.push((is_beside, id));
         }
     }
     wanted.sort_unstable();
@@ -79,26 +79,17 @@ pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
         let arrow = &view.arrows[*id];
         boxes.extend([arrow.from, arrow.to]);
     }
-    let changed_items = items
-        .iter()
-        .filter(|(_, s)| s.mark.is_some())
-        .map(|(id, _)| ItemId(*id));
     // A box whose edges are left out would look unconnected.
     let linked: BTreeSet<ItemId> = view.arrows.iter().flat_map(|a| [a.from, a.to]).collect();
-    for id in changed_items.filter(|id| !linked.contains(id)) {
-        if boxes.len() < MOST_ITEMS {
-            boxes.insert(id);
-        }
-    }
+    let changed = items.values().filter(|shown| shown.mark.is_some());
+    let unlinked = changed.map(Shown::item).filter(|id| !linked.contains(id));
+    boxes.extend(unlinked.take(MOST_ITEMS.saturating_sub(boxes.len())));
     if boxes.is_empty() {
         return None;
     }
-    let pick = |ends: &BTreeMap<u32, Shown>, ids: &mut dyn Iterator<Item = u32>| -> Vec<Shown> {
-        ids.filter_map(|id| ends.get(&id).cloned()).collect()
-    };
     let seen = SeenWindow {
-        items: pick(&items, &mut boxes.into_iter().map(|id| id.0)),
-        arrows: pick(&arrows, &mut drawn.into_iter().map(|id| id.0)),
+        items: boxes.iter().filter_map(|id| items.remove(&id.0)).collect(),
+        arrows: drawn.iter().filter_map(|id| arrows.remove(&id.0)).collect(),
     };
     Some((seen, left_out))
 }
@@ -117,7 +108,7 @@ fn end(looks: &ShownRuns, last: usize) -> Option<Shown> {
     let there = |k: usize| looks.at(k).is_some_and(|shown| !is_gone(shown));
     let is_marked = runs().any(|shown| shown.mark.is_some());
     Some(Shown {
-        rates: None,
+        steps: Vec::new(),
         mark: match (there(0), there(last)) {
             (false, true) => Some(Mark::Added),
             (true, false) => Some(Mark::Removed),

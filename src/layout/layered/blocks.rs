@@ -250,6 +250,17 @@ impl Cut {
     ) -> Option<u64> {
         let mut turns = 0;
         let mut map = Map::new(&[&placed.boxes, words].concat());
+        // The ports of lines inside of a namespace, on each side of its boxes.
+        let mut taken: BTreeMap<(usize, bool), Vec<f64>> = BTreeMap::new();
+        let inside = (0..part.ends.len()).filter(|link| self.between.binary_search(link).is_err());
+        for (route, (from, to)) in inside.map(|link| (&placed.routes[link], part.ends[link])) {
+            let end = route.points().next_back().unwrap_or(route.start);
+            for (v, port) in [(from, route.start), (to, end)] {
+                let centre = placed.boxes[v].centre();
+                let ports = taken.entry((v, port.x > centre.x)).or_default();
+                ports.push(port.y - centre.y);
+            }
+        }
         for is_end in [true, false] {
             let mut sides: BTreeMap<(usize, bool), Vec<usize>> = BTreeMap::new();
             for &link in &self.between {
@@ -261,7 +272,7 @@ impl Cut {
                     sides.entry((v, is_after)).or_default().push(link);
                 }
             }
-            for ((v, _), mut links) in sides {
+            for ((v, is_after), mut links) in sides {
                 let y = |link: &usize| placed.routes[*link].start.y;
                 links.sort_by(|a, b| y(a).total_cmp(&y(b)).then(a.cmp(b)));
                 let end = End {
@@ -269,10 +280,9 @@ impl Cut {
                     rect: placed.boxes[v],
                     outline: plan.vertices[part.vertices[v]].outline,
                 };
-                let many = links.len() as f64;
-                let step = PORT_STEP.min(PORTS * end.rect.h / many);
-                for (nth, link) in links.into_iter().enumerate() {
-                    let aside = (nth as f64 - (many - 1.0) / 2.0) * step;
+                let taken = taken.get(&(v, is_after)).map_or(&[][..], Vec::as_slice);
+                let ports = ports(links.len(), taken, end.rect.h * PORTS);
+                for (link, aside) in links.into_iter().zip(ports) {
                     let (route, is_level) = map.led_on(&placed.routes[link], end, aside)?;
                     placed.routes[link] = route;
                     turns += u64::from(!is_level);
@@ -280,6 +290,32 @@ impl Cut {
             }
         }
         Some(turns)
+    }
+}
+
+/// The distances of new ports from the middle of a side, on the part of it for ports, which is `long`: side by side, or where
+/// those that are `taken` are in the way, the places closest to the middle.
+fn ports(many: usize, taken: &[f64], long: f64) -> Vec<f64> {
+    let step = PORT_STEP.min(long / (many + taken.len()) as f64);
+    let beside = (0..many).map(|nth| (nth as f64 - (many as f64 - 1.0) / 2.0) * step);
+    let is_free = |all: &[f64], at: f64| all.iter().all(|port| (port - at).abs() >= step);
+    let is_clear = beside.clone().all(|at| is_free(taken, at));
+    let near = (0..40_u32).map(|nth| f64::from(nth) * step / 4.0);
+    let near = near
+        .flat_map(|at| [at, -at])
+        .filter(|at| at.abs() <= long / 2.0 && !is_clear);
+    let mut all = taken.to_vec();
+    for at in near {
+        if all.len() < many + taken.len() && is_free(&all, at) {
+            all.push(at);
+        }
+    }
+    let mut ports = all.split_off(taken.len());
+    ports.sort_by(f64::total_cmp);
+    if ports.len() == many {
+        ports
+    } else {
+        beside.collect()
     }
 }
 

@@ -150,7 +150,7 @@ impl View {
             let reported = if look.mark.is_some() { look } else { line };
             Some(Shown {
                 mark: reported.mark,
-                rates: reported.rates,
+                steps: reported.steps.clone(),
                 events: events([look, line].into_iter()),
                 ..(if is_infrastructure { line } else { look }).clone()
             })

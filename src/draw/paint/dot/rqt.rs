@@ -10,6 +10,7 @@ use std::fmt::Write as _;
 use super::names::{escape_name, quoted};
 use super::{DotView, label, line, pen_width, rate};
 use crate::base::geometry::{Point, Rect};
+use crate::draw::paint::xml::hundredth;
 use crate::graph::{Element, Id as _};
 use crate::layout::Route;
 use crate::view::{Arrow, ArrowKind, Item, ItemId, ItemKind, Mark, SeenWindow, Shown};
@@ -253,16 +254,7 @@ fn middle(route: &Route) -> Point {
 
 /// The number with at most two decimals; 0 for one that is not finite.
 fn number(value: f64) -> String {
-    if !value.is_finite() {
-        return "0".to_owned();
-    }
-    let text = format!("{value:.2}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" {
-        "0".to_owned()
-    } else {
-        text.to_owned()
-    }
+    hundredth(value).to_string()
 }
 
 fn inches(points: f64) -> String {
