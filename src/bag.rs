@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 
 use crate::base::error::{Error, Result};
 
-pub(crate) use adapters::{Bounds, known_span};
+pub(crate) use adapters::known_span;
 pub(crate) use deferred::open_each;
 pub(crate) use folder::{Recording, parts_of, plain, recordings, written};
 pub(crate) use input::BagPlace;
@@ -72,11 +72,21 @@ pub fn sniff(input: &Input) -> Result<InputKind> {
     let mut place = place(input)?;
     let head = head(&mut place)?;
     let json = head.trim_ascii_start().first() == Some(&b'{');
-    match FORMATS.iter().find(|f| (f.sniff)(&place, &head)) {
+    match recognized(&mut place, &head)? {
         Some(row) => Ok(InputKind::Bag(row)),
         None if json => Ok(InputKind::Json),
         None => Err(explain(path, &head, path.is_dir())),
     }
+}
+
+/// The format of an input: by its first bytes or, if these are of no known kind, by a chunk behind them or its last ones.
+fn recognized(place: &mut BagPlace, head: &[u8]) -> Result<Option<&'static FormatRow>> {
+    let row = FORMATS.iter().find(|row| (row.sniff)(place, head));
+    if row.is_some() || unknown::is_known(head) {
+        return Ok(row);
+    }
+    let bytes = input::around(place)?;
+    Ok(FORMATS.iter().find(|row| (row.is_inside)(&bytes)))
 }
 
 /// Opens a bag of any format, recognized by its first bytes.
@@ -87,7 +97,7 @@ pub fn sniff(input: &Input) -> Result<InputKind> {
 pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     let mut place = place(input)?;
     let head = head(&mut place)?;
-    if let Some(row) = FORMATS.iter().find(|f| (f.sniff)(&place, &head)) {
+    if let Some(row) = recognized(&mut place, &head)? {
         return (row.open)(place, options);
     }
     let path = match input {

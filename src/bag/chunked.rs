@@ -31,7 +31,9 @@ pub(crate) use growing::follow;
 use index::Query;
 pub(crate) use index::{ChunkBody, Index, IndexSum, LONGEST_INDEX};
 pub(crate) use plan::{Chunk, ChunkPlan, Fault, MOST_CHUNKS, Unindexed, Used};
-pub(crate) use record::{ChunkHead, Connections, NoRecord, RecordHead, SecondFinds, pass, walk};
+pub(crate) use record::{
+    ChunkHead, Connections, Counts, NoRecord, RecordHead, SecondFinds, pass, walk,
+};
 
 /// The parser for one format of chunked bags. A value keeps the state that later descriptions depend on.
 pub(crate) trait Grammar: Default + Send + 'static {
@@ -41,6 +43,8 @@ pub(crate) trait Grammar: Default + Send + 'static {
     const HAS_END: bool;
     /// Whether messages may also be outside chunks.
     const IS_LOOSE: bool;
+    /// The first bytes of a bag.
+    const OPENING: &'static [u8];
     /// The bytes after that record.
     const CLOSING: &'static [u8];
     /// The head of a description record.
@@ -115,6 +119,8 @@ struct Indexed<G> {
     source: FileSource,
     plan: Result<ChunkPlan, Unindexed>,
     facts: Vec<(String, String)>,
+    /// Whether its first bytes are those of a bag.
+    is_opened: bool,
     verify: bool,
     grammar: PhantomData<fn() -> G>,
 }
@@ -146,6 +152,7 @@ pub(crate) fn open<G: Grammar>(place: BagPlace, options: &OpenOptions) -> Result
                 source,
                 plan,
                 facts,
+                is_opened: head.starts_with(G::OPENING),
                 verify: options.verify,
                 grammar,
             }))
@@ -202,6 +209,7 @@ impl<G: Grammar> Reader for Indexed<G> {
             self.span()?;
         }
         let mut sink = Clip::new(range, sink);
+        opened(self.is_opened, &mut sink);
         let report = match &self.plan {
             _ if self.verify => self.by_the_second_reader(&mut sink),
             Ok(plan) => self.by_index(plan, range, &mut sink),
@@ -209,6 +217,7 @@ impl<G: Grammar> Reader for Indexed<G> {
         };
         Ok(Report {
             bytes_read: self.source.bytes_read(),
+            complete: report.complete && self.is_opened,
             file_bytes: self.source.len(),
             facts: self.facts.clone(),
             ..report
@@ -328,6 +337,19 @@ impl<G: Grammar> Indexed<G> {
     }
 }
 
+/// Reports that the first bytes of a bag are damaged.
+fn opened(is_opened: bool, sink: &mut dyn Sink) {
+    if !is_opened {
+        let text = "its first bytes are not those of a bag";
+        sink.notice(Notice::new(NoticeKind::Damaged, text));
+    }
+}
+
+/// Whether a chunk begins near the beginning of these bytes, of a bag whose first bytes are damaged.
+pub(crate) fn has_chunk<G: Grammar>(bytes: &[u8]) -> bool {
+    (0..bytes.len()).any(|at| G::is_chunk(&bytes[at..]))
+}
+
 /// A report with the values common to all tiers.
 fn report<G: Grammar>(name: String, tier: Tier, compression: &BTreeSet<Compression>) -> Report {
     Report {
@@ -349,10 +371,13 @@ impl<G: Grammar> Reader for Piped<G> {
         if G::is_summed(None) {
             self.stream.sum_up();
         }
+        let head = self.stream.peek(G::OPENING.len());
+        let is_opened = head.is_ok_and(|head| head == G::OPENING);
+        opened(is_opened, sink);
         G::begin(&mut self.stream);
         let found = forward::read::<G>(&mut self.stream, 0, &mut Clip::new(range, sink));
         Ok(Report {
-            complete: found.complete,
+            complete: found.complete && is_opened,
             tier_reason: Some("a pipe has no index".to_owned()),
             bytes_read: self.stream.position(),
             ..report::<G>(self.name.clone(), Tier::Forward, &found.compression)

@@ -85,6 +85,8 @@ pub struct FormatRow {
     pub(crate) needs_file: bool,
     /// Whether an input's first bytes are those of such a bag.
     pub(crate) sniff: fn(&BagPlace, &[u8]) -> bool,
+    /// Whether the first and last bytes of an input of no known kind are those of such a bag whose very first are damaged.
+    pub(crate) is_inside: fn(&[u8]) -> bool,
     /// Opens a reader.
     pub(crate) open: fn(BagPlace, &OpenOptions) -> Result<Box<dyn Reader>>,
     /// Opens a reader of a bag that is still being written.
@@ -137,6 +139,31 @@ pub(crate) fn head(place: &mut BagPlace) -> Result<Vec<u8>> {
         BagPlace::Pipe(name, stream) => {
             let head = stream.peek(HEAD).map(<[u8]>::to_vec);
             head.map_err(Error::io("read", Path::new(name)))
+        }
+    }
+}
+
+/// The bytes that are searched for a chunk where the first ones are damaged, a whole one at least.
+const SEARCHED: usize = 1 << 20;
+
+/// The first bytes, more of them than [`head`], and the last ones of a file; empty for a folder.
+pub(crate) fn around(place: &mut BagPlace) -> Result<Vec<u8>> {
+    match place {
+        BagPlace::Folder(_) => Ok(Vec::new()),
+        BagPlace::File(source) => {
+            let mut bytes = vec![0; SEARCHED];
+            let fail = || Error::io("read", source.path());
+            let got = source.read_at(0, &mut bytes).map_err(fail())?;
+            bytes.truncate(got);
+            let mut last = [0; 8];
+            let at = source.len().saturating_sub(8);
+            let got = source.read_at(at, &mut last).map_err(fail())?;
+            bytes.extend(&last[..got]);
+            Ok(bytes)
+        }
+        BagPlace::Pipe(name, stream) => {
+            let bytes = stream.peek(SEARCHED).map(<[u8]>::to_vec);
+            bytes.map_err(Error::io("read", Path::new(name)))
         }
     }
 }

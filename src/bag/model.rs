@@ -225,8 +225,8 @@ pub enum Growth {
     Ended,
 }
 
-/// A recording that is read while it is written. Every message is reported once, as soon as it is complete.
-/// Lost or damaged data is only detected when the closed recording is read.
+/// A recording that is read while it is written. Every message is reported once, as soon as it is complete, and damage
+/// as soon as it is passed; what is missing at the end shows when the closed recording is read.
 pub(crate) trait Growing: Send {
     /// Reports to `sink` what has become readable since the last call.
     ///

@@ -4,7 +4,7 @@ use std::io;
 
 use super::Grammar;
 use super::forward::next_chunk;
-use super::index::{ChunkBody, Index, IndexSum, LONGEST_INDEX, Query, hand_over, nameless};
+use super::index::{ChunkBody, Index, IndexSum, LONGEST_INDEX, Query, hand_over, nameless, spans};
 use super::plan::Chunk;
 use super::record::{NoRecord, RecordHead};
 use super::unpack::{Visitor, unpack};
@@ -25,6 +25,8 @@ impl<G: Grammar> Query<'_, G> {
             Ok(found) => found,
             Err(e) => return lost(sink, "a chunk's index cannot be read", &e),
         };
+        let times = (chunk.first, chunk.last);
+        let found = found.filter(|found| found.index.times().is_none_or(|own| spans(own, times)));
         let Some(found) = found else {
             let text = "chunks were read whole, since their index is missing or wrong";
             sink.notice(Notice::new(NoticeKind::Damaged, text));
@@ -34,12 +36,8 @@ impl<G: Grammar> Query<'_, G> {
         };
         let body = found.body.or_else(|| self.moved(chunk));
         self.report(&found.index, body, sink);
-        let wrong = [
-            (!found.index.spans(chunk.first, chunk.last)).then_some(OTHER_TIMES),
-            (found.place == Place::Apart).then_some(APART),
-        ];
-        for text in wrong.into_iter().flatten() {
-            sink.notice(Notice::new(NoticeKind::Damaged, text));
+        if found.place == Place::Apart {
+            sink.notice(Notice::new(NoticeKind::Damaged, APART));
         }
         if found.place != Place::Expected {
             self.unnamed(chunk, sink);
@@ -172,7 +170,7 @@ impl<G: Grammar> Query<'_, G> {
     }
 }
 
-const OTHER_TIMES: &str = "chunks begin or end at other times than the bag's index states";
+pub(super) const OTHER_TIMES: &str = "chunks begin or end at other times than the bag's index states";
 const APART: &str = "chunks differ in position or length from the bag's index";
 
 /// The index of a chunk.

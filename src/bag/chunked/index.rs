@@ -101,17 +101,22 @@ impl Index {
         }
     }
 
-    /// Whether these are the first and last times in the index. A message at 0 does not count: some writers take 0 for
-    /// an unknown time and state the time of another message.
-    pub(super) fn spans(&self, first: Stamp, last: Stamp) -> bool {
-        let (mut low, mut high) = (Stamp::MAX, Stamp::MIN);
-        for at in &self.stamps {
-            low = low.min(*at);
-            high = high.max(*at);
-        }
-        let is_first = low == first || low == Stamp(0);
-        self.stamps.is_empty() || is_first && high == last
+    /// The first and the last time in it.
+    pub(super) fn times(&self) -> Option<(Stamp, Stamp)> {
+        bounds(&self.stamps)
     }
+}
+
+/// The first and the last of some times.
+pub(super) fn bounds(stamps: &[Stamp]) -> Option<(Stamp, Stamp)> {
+    let ends = stamps.iter().map(|at| (*at, *at));
+    ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+}
+
+/// Whether the first and the last time in a chunk are the stated ones. A message at 0 does not count: some writers take 0
+/// for an unknown time and state the time of another message.
+pub(super) fn spans((low, high): (Stamp, Stamp), (first, last): (Stamp, Stamp)) -> bool {
+    (low == first || low == Stamp(0)) && high == last
 }
 
 /// The position of a chunk's records.

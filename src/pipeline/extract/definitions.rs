@@ -55,7 +55,8 @@ fn msg_files(folder: &Path) -> Result<Vec<(String, PathBuf)>> {
             let (path, kind) = (entry.path(), entry.file_type());
             if kind.is_ok_and(|kind| kind.is_dir()) {
                 waiting.push(path);
-            } else if path
+            } else if path.is_file()
+                && path
                 .extension()
                 .is_some_and(|end| KINDS.iter().any(|kind| end == *kind))
             {

@@ -36,7 +36,8 @@ const MOST_NAMED: usize = 3;
 const MOST_HELD_IN_ALL: usize = 64 << 20;
 
 pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
-    let range = job.range(watch)?;
+    let mut lost = Lost::default();
+    let range = job.range(&mut lost.notices, watch)?;
     let types = definitions::read(&job.msg_paths)?;
     let mut tables = FieldTables {
         folder: Folder::create(job.target.path())?,
@@ -46,7 +47,6 @@ pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted>
         waiting: 0,
         failed: None,
     };
-    let mut lost = Lost::default();
     for mut reader in job.open()? {
         let mut one = OfBag {
             job,

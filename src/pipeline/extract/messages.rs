@@ -16,13 +16,14 @@ const MOST_ROWS: usize = 16 * 1024;
 /// Reads all times first, then writes them sorted, so that bags that overlap in time make one sorted table.
 pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
     let sink = OutputSink::create(&job.target, None)?;
-    let range = job.range(watch)?;
     let mut times = MessageTimes::new(&job.topics, Want::Sizes);
+    let range = job.range(&mut times.notices, watch)?;
     for mut reader in job.open()? {
         times.read(&mut *reader, range, watch)?;
         stop(watch)?;
     }
-    times.finish()?;
+    let aside = times.finish()?;
+    times.notices.extend(aside);
     Ok(Extracted {
         tables: 1,
         rows: write(job, &times, sink, watch)?,
