@@ -154,7 +154,9 @@ impl Gather {
             stamps.sort_unstable();
             stamps
         };
-        !self.spilled.is_empty() || held == stamps || held.len() == stamps.len() && sorted(held) == sorted(stamps)
+        !self.spilled.is_empty()
+            || held == stamps
+            || held.len() == stamps.len() && sorted(held) == sorted(stamps)
     }
 
     /// Drops the stamps batched for a connection; returns their number, or `None` if some were already

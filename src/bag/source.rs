@@ -24,6 +24,11 @@ impl FileSource {
     /// # Errors
     /// An error of the system.
     pub(crate) fn open(path: &Path) -> Result<Self> {
+        // Opening a pipe would wait for its writer.
+        if !path.metadata().map_err(Error::io("read", path))?.is_file() {
+            let error = io::Error::other("it is not a regular file");
+            return Err(Error::io("read", path)(error));
+        }
         let file = File::open(path).map_err(Error::io("read", path))?;
         let len = file.metadata().map_err(Error::io("read", path))?.len();
         Ok(Self {

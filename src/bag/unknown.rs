@@ -19,35 +19,35 @@ pub(crate) fn explain(path: &Path, head: &[u8], folder: bool) -> Error {
 
 /// The first bytes of files that are no bags, what these are, and advice.
 const KNOWN: &[(&[u8], &str, &str)] = &[
-        (
-            b"version https://git-lfs",
-            "a git-LFS pointer",
-            "`git lfs pull` fetches the bag itself",
-        ),
-        (b"PK\x03\x04", "a zip archive", "unpack it first"),
-        (b"\x1f\x8b", "a gzip file", "unpack it first (`gunzip`)"),
-        (b"BZh", "a bzip2 file", "unpack it first (`bunzip2`)"),
-        (b"\xfd7zXZ", "an xz file", "unpack it first (`unxz`)"),
-        (
-            b"\x04\x22\x4d\x18",
-            "an LZ4 file",
-            "unpack it first (`lz4 -d`)",
-        ),
-        (
-            b"rosbag2_bagfile",
-            "the metadata of a recording",
-            "give the folder that contains it",
-        ),
-        (
-            b"<!DOCTYPE",
-            "a web page",
-            "the download failed; fetch the bag again",
-        ),
-        (
-            b"<html",
-            "a web page",
-            "the download failed; fetch the bag again",
-        ),
+    (
+        b"version https://git-lfs",
+        "a git-LFS pointer",
+        "`git lfs pull` fetches the bag itself",
+    ),
+    (b"PK\x03\x04", "a zip archive", "unpack it first"),
+    (b"\x1f\x8b", "a gzip file", "unpack it first (`gunzip`)"),
+    (b"BZh", "a bzip2 file", "unpack it first (`bunzip2`)"),
+    (b"\xfd7zXZ", "an xz file", "unpack it first (`unxz`)"),
+    (
+        b"\x04\x22\x4d\x18",
+        "an LZ4 file",
+        "unpack it first (`lz4 -d`)",
+    ),
+    (
+        b"rosbag2_bagfile",
+        "the metadata of a recording",
+        "give the folder that contains it",
+    ),
+    (
+        b"<!DOCTYPE",
+        "a web page",
+        "the download failed; fetch the bag again",
+    ),
+    (
+        b"<html",
+        "a web page",
+        "the download failed; fetch the bag again",
+    ),
 ];
 
 /// The place of the mark of a tar archive, which may contain bags.
@@ -59,7 +59,8 @@ pub(crate) fn is_known(head: &[u8]) -> bool {
 }
 
 fn is_tar(head: &[u8]) -> bool {
-    head.get(TAR..).is_some_and(|mark| mark.starts_with(b"ustar"))
+    head.get(TAR..)
+        .is_some_and(|mark| mark.starts_with(b"ustar"))
 }
 
 fn guess(head: &[u8]) -> (&'static str, &'static str) {

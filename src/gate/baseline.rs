@@ -360,9 +360,8 @@ fn topic(seen: &[TopicIn<'_>], times: &Times, is_optional: bool) -> Line {
         .filter(|_| hz.is_none());
     let mean_hz = mean(seen, hz).filter(|_| is_timed);
     let names = |names: BTreeSet<String>| (!names.is_empty()).then(|| list(names.iter()));
-    let nodes = |nodes: BTreeSet<String>| {
-        names(nodes.iter().map(|name| Pattern::text_of(name)).collect())
-    };
+    let nodes =
+        |nodes: BTreeSet<String>| names(nodes.iter().map(|name| Pattern::text_of(name)).collect());
     let types = common(seen, |s| Some(s.types())).unwrap_or_default();
     let types = match types.first() {
         Some(one) if types.len() == 1 => Some(scalar(one)),

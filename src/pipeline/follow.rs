@@ -11,13 +11,12 @@ use super::Reading;
 use super::collect::Collected;
 use super::read::so_far;
 pub use crate::bag::Growth;
-use crate::bag::{
-    self, ConnectionId, Growing, Input, OpenOptions, Report, Sink, Tier, file_name,
-};
+use crate::bag::{self, ConnectionId, Growing, Input, OpenOptions, Report, Sink, Tier, file_name};
 use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, Notices};
 use crate::base::time::{Period, Span, Stamp};
+use crate::evidence::clock::is_sure;
 use crate::evidence::collector::Collector;
 use crate::graph::window::Length;
 use crate::mission::Mission;
@@ -97,7 +96,10 @@ impl Follow {
     /// If the recording no longer exists, or a temporary file cannot be used.
     pub fn poll(&mut self) -> Result<Growth> {
         let growth = self.growing.poll(&mut self.collector.on(&mut |_, _| {}))?;
-        if let Some((first, last, _)) = self.collector.extent().filter(|_| growth == Growth::More) {
+        // A message at an impossible time makes no others old.
+        let is_sure = |(first, last, _): &(Stamp, Stamp, u64)| is_sure(Span::new(*first, *last));
+        let extent = self.collector.extent().filter(is_sure);
+        if let Some((first, last, _)) = extent.filter(|_| growth == Growth::More) {
             self.origin.get_or_insert(first);
             let keep = self.keep.nanos();
             let begins = self.forgotten.unwrap_or(first);

@@ -10,9 +10,7 @@ use super::check::{Behind, ChunkMessages};
 use super::chunk::OTHER_TIMES;
 use super::index::{absent, hand_over, nameless, spans};
 use super::plan::MOST_CHUNKS;
-use super::record::{
-    Announced, ChunkHead, Counts, NoRecord, RecordHead, pass, peek_whole, walk,
-};
+use super::record::{Announced, ChunkHead, Counts, NoRecord, RecordHead, pass, peek_whole, walk};
 use super::unpack::{Visitor, records, unpack};
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Sink};
@@ -95,12 +93,22 @@ impl Account {
     fn unread(&self, messages: u64) -> impl Iterator<Item = String> + use<> {
         // More than are compared are taken to be all.
         let is_full = self.chunks.len() >= MOST_CHUNKS;
-        let chunks = if is_full { u64::MAX } else { self.chunks.len() as u64 };
+        let chunks = if is_full {
+            u64::MAX
+        } else {
+            self.chunks.len() as u64
+        };
         let pairs = [
             (self.stated.messages, messages, "messages"),
-            (u64::from(self.stated.chunks).max(self.listed), chunks, "chunks"),
+            (
+                u64::from(self.stated.chunks).max(self.listed),
+                chunks,
+                "chunks",
+            ),
         ];
-        let fewer = pairs.into_iter().filter(|(stated, found, _)| stated > found);
+        let fewer = pairs
+            .into_iter()
+            .filter(|(stated, found, _)| stated > found);
         let fewer = fewer.map(|(stated, found, what)| {
             format!("the bag should contain {stated} {what}; found {found}")
         });
@@ -187,12 +195,10 @@ impl<G: Grammar> Walk<G> {
                 }
                 record => forward.record(stream, from, record),
             });
+            at = if is_growing { at } else { stream.position() };
             match step {
                 Err(NoRecord::Broken | NoRecord::Cut) if forward.resume(stream, from) => {}
-                step => {
-                    at = if is_growing { at } else { stream.position() };
-                    step?;
-                }
+                step => step?,
             }
             at = stream.position();
             forward.sink.progress(at, size);
@@ -380,11 +386,7 @@ impl<G: Grammar> Forward<'_, G> {
     }
 
     /// Reads a compressed chunk without a length: the last one, which was never closed, unless another follows.
-    fn unclosed(
-        &mut self,
-        stream: &mut ByteStream<'_>,
-        how: Compression,
-    ) -> Result<(), NoRecord> {
+    fn unclosed(&mut self, stream: &mut ByteStream<'_>, how: Compression) -> Result<(), NoRecord> {
         let mut body = BeforeChunk::<G>::new(stream);
         let read = match self.walk.allowance.open(how, &mut body) {
             Ok(reader) => records(&mut ByteStream::of_reader(reader), u64::MAX, self),

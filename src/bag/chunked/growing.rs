@@ -81,7 +81,9 @@ impl<G: Grammar> Growing for GrowingChunks<G> {
             forward::Growth::Growing
         };
         self.at = self.walk.go(&mut stream, 0, growth, sink).1;
-        self.behind = self.last_bytes(&source).map_err(Error::io("read", &self.path))?;
+        self.behind = self
+            .last_bytes(&source)
+            .map_err(Error::io("read", &self.path))?;
         Ok(Growth::More)
     }
 

@@ -27,7 +27,11 @@ pub(crate) enum RecordHead<D> {
     /// The numbers of messages and chunks that the bag states.
     Total { stated: Counts, len: u64 },
     /// The position of a chunk that the bag's index lists, and the times of its first and last message.
-    Listed { at: u64, times: (Stamp, Stamp), len: u64 },
+    Listed {
+        at: u64,
+        times: (Stamp, Stamp),
+        len: u64,
+    },
     /// The end of the data: no message follows. `crc` is the CRC-32 of all bytes of the bag before the `len` bytes, if
     /// it is stated.
     DataEnd { len: u64, crc: Option<u32> },

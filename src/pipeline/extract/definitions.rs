@@ -57,8 +57,8 @@ fn msg_files(folder: &Path) -> Result<Vec<(String, PathBuf)>> {
                 waiting.push(path);
             } else if path.is_file()
                 && path
-                .extension()
-                .is_some_and(|end| KINDS.iter().any(|kind| end == *kind))
+                    .extension()
+                    .is_some_and(|end| KINDS.iter().any(|kind| end == *kind))
             {
                 let is_kind = KINDS.iter().any(|kind| folder.ends_with(kind));
                 let outer = folder.parent().filter(|_| is_kind);

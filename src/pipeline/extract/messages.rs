@@ -8,6 +8,7 @@ use crate::evidence::times::Timed;
 use crate::export::sink::OutputSink;
 use crate::export::tables::writer::begin;
 use crate::pipeline::Watch;
+use crate::pipeline::collect::no_messages;
 use crate::pipeline::times::{MessageTimes, Sender};
 
 /// The number of rows buffered before they are written.
@@ -24,6 +25,10 @@ pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted>
     }
     let aside = times.finish()?;
     times.notices.extend(aside);
+    let is_whole = job.topics.passes_all() && job.start.is_none() && job.end.is_none();
+    if is_whole && times.span().is_none() {
+        return Err(no_messages(&job.inputs, &times.notices));
+    }
     Ok(Extracted {
         tables: 1,
         rows: write(job, &times, sink, watch)?,
