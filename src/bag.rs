@@ -32,7 +32,7 @@ pub(crate) use deferred::open_each;
 pub(crate) use folder::{Recording, parts_of, plain, recordings, written};
 pub(crate) use input::BagPlace;
 pub use input::{FormatRow, Input, file_name, size_on_disk};
-use input::{closed, head, place};
+use input::{HEAD, SEARCHED, closed, head, last, place};
 pub(crate) use model::Growing;
 #[doc(hidden)]
 pub use model::Growth;
@@ -70,7 +70,7 @@ pub fn sniff(input: &Input) -> Result<InputKind> {
         _ => return Ok(InputKind::Bag(&FORMATS[0])),
     };
     let mut place = place(input)?;
-    let head = head(&mut place)?;
+    let head = head(&mut place, HEAD)?;
     let json = head.trim_ascii_start().first() == Some(&b'{');
     match recognized(&mut place, &head)? {
         Some(row) => Ok(InputKind::Bag(row)),
@@ -85,7 +85,7 @@ fn recognized(place: &mut BagPlace, head: &[u8]) -> Result<Option<&'static Forma
     if row.is_some() || unknown::is_known(head) {
         return Ok(row);
     }
-    let bytes = input::around(place)?;
+    let bytes = [&input::head(place, SEARCHED)?[..], &last(place)].concat();
     Ok(FORMATS.iter().find(|row| (row.is_inside)(&bytes)))
 }
 
@@ -96,7 +96,7 @@ fn recognized(place: &mut BagPlace, head: &[u8]) -> Result<Option<&'static Forma
 /// [`Error::Malformed`], with a hint, if no content can be read.
 pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     let mut place = place(input)?;
-    let head = head(&mut place)?;
+    let head = head(&mut place, HEAD)?;
     if let Some(row) = recognized(&mut place, &head)? {
         return (row.open)(place, options);
     }

@@ -20,7 +20,7 @@ use std::sync::Arc;
 use crate::bag::adapters::{Clip, GROUP, in_order, share};
 use crate::bag::decompress::Compression;
 use crate::bag::input::{BagPlace, file_name};
-use crate::bag::model::{Connection, OpenOptions, Reader, Report, Sink, Tier, Want};
+use crate::bag::model::{Connection, OpenOptions, Reader, Report, Sink, Tier, Want, damaged};
 use crate::bag::source::{ByteStream, FAR, FileSource};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
@@ -217,7 +217,6 @@ impl<G: Grammar> Reader for Indexed<G> {
         };
         Ok(Report {
             bytes_read: self.source.bytes_read(),
-            complete: report.complete && self.is_opened,
             file_bytes: self.source.len(),
             facts: self.facts.clone(),
             ..report
@@ -269,7 +268,7 @@ impl<G: Grammar> Indexed<G> {
         }
     }
 
-    fn front_to_back(&self, reason: &Unindexed, sink: &mut dyn Sink) -> Report {
+    fn front_to_back(&self, reason: &Unindexed, sink: &mut Clip<'_>) -> Report {
         let text = format!("read from the front, since {}", reason.why);
         let is_wrong = reason.fault == Fault::Wrong;
         let kind = if is_wrong {
@@ -278,18 +277,16 @@ impl<G: Grammar> Indexed<G> {
             NoticeKind::Downgraded
         };
         sink.notice(Notice::new(kind, text));
-        let mut found = self.forward(sink);
-        found.complete &= !is_wrong;
-        if reason.fault == Fault::Cut && found.complete {
+        let compression = self.forward(sink);
+        if reason.fault == Fault::Cut && !sink.lost {
             // Cut exactly between records, so only the head reveals it.
-            found.complete = false;
             let text = "the end of the bag is missing";
             sink.notice(Notice::new(NoticeKind::Truncated, text));
         }
         Report {
-            complete: found.complete,
+            complete: !sink.lost,
             tier_reason: Some(reason.why.clone()),
-            ..self.report(Tier::Forward, &found.compression)
+            ..self.report(Tier::Forward, &compression)
         }
     }
 
@@ -310,18 +307,18 @@ impl<G: Grammar> Indexed<G> {
                 ..self.report(Tier::Verify, &verified.compression)
             };
         }
-        let found = self.forward(sink);
+        let compression = self.forward(sink);
         Report {
             // Without an index, the first reading did the same.
-            complete: found.complete && self.plan.is_ok(),
+            complete: !sink.lost && self.plan.is_ok(),
             tier_reason: Some(format!(
                 "the second reader cannot read it ({why}); read from the front instead"
             )),
-            ..self.report(Tier::Verify, &found.compression)
+            ..self.report(Tier::Verify, &compression)
         }
     }
 
-    fn forward(&self, sink: &mut dyn Sink) -> forward::ForwardScan {
+    fn forward(&self, sink: &mut dyn Sink) -> BTreeSet<Compression> {
         let mut stream = ByteStream::of_file(&self.source, 0, self.source.len(), FAR);
         // Reading bytes that could be skipped pays off only if no damage is known yet.
         let is_sound = matches!(&self.plan, Err(reason) if reason.fault == Fault::Missing);
@@ -339,10 +336,8 @@ impl<G: Grammar> Indexed<G> {
 
 /// Reports that the first bytes of a bag are damaged.
 fn opened(is_opened: bool, sink: &mut dyn Sink) {
-    if !is_opened {
-        let text = "its first bytes are not those of a bag";
-        sink.notice(Notice::new(NoticeKind::Damaged, text));
-    }
+    let text = "its first bytes are not those of a bag";
+    damaged(sink, u64::from(!is_opened), text);
 }
 
 /// Whether a chunk begins near the beginning of these bytes, of a bag whose first bytes are damaged.
@@ -373,14 +368,15 @@ impl<G: Grammar> Reader for Piped<G> {
         }
         let head = self.stream.peek(G::OPENING.len());
         let is_opened = head.is_ok_and(|head| head == G::OPENING);
-        opened(is_opened, sink);
+        let mut sink = Clip::new(range, sink);
+        opened(is_opened, &mut sink);
         G::begin(&mut self.stream);
-        let found = forward::read::<G>(&mut self.stream, 0, &mut Clip::new(range, sink));
+        let compression = forward::read::<G>(&mut self.stream, 0, &mut sink);
         Ok(Report {
-            complete: found.complete && is_opened,
+            complete: !sink.lost,
             tier_reason: Some("a pipe has no index".to_owned()),
             bytes_read: self.stream.position(),
-            ..report::<G>(self.name.clone(), Tier::Forward, &found.compression)
+            ..report::<G>(self.name.clone(), Tier::Forward, &compression)
         })
     }
 }

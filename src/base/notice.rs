@@ -133,14 +133,6 @@ impl Notices {
         rest
     }
 
-    /// The notices that report skipped data.
-    #[must_use]
-    pub(crate) fn losses(&self) -> Self {
-        let mut losses = self.clone();
-        losses.0.retain(|(kind, _), _| kind.is_loss());
-        losses
-    }
-
     /// Whether any notice reports skipped data.
     pub fn any_loss(&self) -> bool {
         self.0.keys().any(|(kind, _)| kind.is_loss())

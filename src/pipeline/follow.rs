@@ -7,11 +7,11 @@ mod feed;
 
 use std::path::Path;
 
-use super::Reading;
 use super::collect::Collected;
-use super::read::so_far;
+use super::read::{read, so_far};
+use super::{Reading, Unwatched};
 pub use crate::bag::Growth;
-use crate::bag::{self, ConnectionId, Growing, Input, OpenOptions, Report, Sink, Tier, file_name};
+use crate::bag::{self, Growing, Input, Report, Tier, file_name};
 use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, Notices};
@@ -32,18 +32,6 @@ pub struct Follow {
     /// The time before which messages were dropped, except the last of each topic.
     forgotten: Option<Stamp>,
     keep: Period,
-}
-
-/// A sink that only keeps notices.
-#[derive(Default)]
-struct Said(Notices);
-
-impl Sink for Said {
-    fn stamps(&mut self, _: ConnectionId, _: &[Stamp], _: Option<&[u32]>) {}
-
-    fn notice(&mut self, notice: Notice) {
-        self.0.add(notice);
-    }
 }
 
 /// The mission of a growing recording so far.
@@ -118,15 +106,14 @@ impl Follow {
     /// If it cannot be read, or a temporary file cannot be used.
     pub(crate) fn losses(&self, is_over: bool) -> Result<Notices> {
         let from = self.forgotten.unwrap_or(Stamp::MIN);
-        let mut losses = self.collector.so_far(from)?.notices.losses();
-        if is_over {
-            let mut closed = Said::default();
-            let input = Input::Path(self.growing.path().to_owned());
-            bag::open(&input, &OpenOptions::default())?.read(None, &mut closed)?;
-            let is_new = |new: &Notice| losses.iter().all(|known| known.text != new.text);
-            let new: Vec<Notice> = closed.0.losses().iter().filter(is_new).collect();
-            losses.extend(new);
-        }
+        let known = self.collector.so_far(from)?.notices;
+        let closed = is_over.then(|| read(&self.closed(), &mut Unwatched));
+        let closed = closed.transpose()?.map(|mission| mission.notices);
+        let is_new = |new: &Notice| known.iter().all(|known| known.text != new.text);
+        let new = closed.iter().flat_map(Notices::iter).filter(is_new);
+        let mut losses = Notices::new();
+        let all = known.iter().chain(new);
+        losses.extend(all.filter(|notice| notice.kind.is_loss()));
         Ok(losses)
     }
 

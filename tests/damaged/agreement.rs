@@ -7,7 +7,7 @@ use std::process::Command;
 use std::thread;
 
 use bagreel::bag::{Report, Tier, Want};
-use bagreel::base::error::Result;
+use bagreel::internals::base::error::Result;
 use bagreel::internals::base::notice::NoticeKind;
 
 use super::{bagreel, places};
@@ -22,10 +22,8 @@ fn changed(bytes: &[u8], kind: usize, mut places: impl Iterator<Item = (usize, u
     let mut changed = bytes.to_vec();
     let is_bag = bytes.starts_with(b"#ROSBAG");
     let mut place = || {
-        let mut inside = places.by_ref();
-        inside
-            .find(|(at, _)| !is_bag || !super::every_byte::PADDING.contains(at))
-            .unwrap()
+        let is_free = |at: usize| !is_bag || !super::every_byte::PADDING.contains(&at);
+        places.find(|(at, _)| is_free(*at)).unwrap()
     };
     let (at, bit) = place();
     let len = bytes.len();

@@ -9,9 +9,8 @@ use super::plan::Chunk;
 use super::record::{NoRecord, RecordHead};
 use super::unpack::{Visitor, unpack};
 use crate::bag::adapters::Gather;
-use crate::bag::model::{Sink, Want, lost};
+use crate::bag::model::{Sink, Want, damaged, lost};
 use crate::bag::source::{ByteStream, FAR, GLANCE};
-use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
 
 impl<G: Grammar> Query<'_, G> {
@@ -28,8 +27,11 @@ impl<G: Grammar> Query<'_, G> {
         let times = (chunk.first, chunk.last);
         let found = found.filter(|found| found.index.times().is_none_or(|own| spans(own, times)));
         let Some(found) = found else {
-            let text = "chunks were read whole, since their index is missing or wrong";
-            sink.notice(Notice::new(NoticeKind::Damaged, text));
+            damaged(
+                sink,
+                1,
+                "chunks were read whole, since their index is missing or wrong",
+            );
             let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, FAR);
             self.walked(&mut stream, Share::Whole, sink);
             return self.unnamed(chunk, sink);
@@ -37,7 +39,7 @@ impl<G: Grammar> Query<'_, G> {
         let body = found.body.or_else(|| self.moved(chunk));
         self.report(&found.index, body, sink);
         if found.place == Place::Apart {
-            sink.notice(Notice::new(NoticeKind::Damaged, APART));
+            damaged(sink, 1, APART);
         }
         if found.place != Place::Expected {
             self.unnamed(chunk, sink);
@@ -52,8 +54,7 @@ impl<G: Grammar> Query<'_, G> {
         let mut stream = ByteStream::of_file(self.source, body.range.end, self.tail, FAR);
         let mut from = chunk.start;
         while next_chunk::<G>(&mut stream, from) && stream.position() < chunk.end {
-            let text = "chunks that the index does not list were read";
-            sink.notice(Notice::new(NoticeKind::Damaged, text));
+            damaged(sink, 1, "chunks that the index does not list were read");
             from = stream.position();
             let here = Chunk {
                 start: from,
@@ -140,8 +141,7 @@ impl<G: Grammar> Query<'_, G> {
     /// Reports the chunk at the position of `stream` to `sink`, record by record, and damage in it.
     fn walked(&self, stream: &mut ByteStream<'_>, what: Share, sink: &mut dyn Sink) {
         if let Err(why) = self.walk(stream, what, sink) {
-            let text = format!("a chunk is damaged inside: {why}");
-            sink.notice(Notice::new(NoticeKind::Damaged, text));
+            damaged(sink, 1, &format!("a chunk is damaged inside: {why}"));
         }
     }
 

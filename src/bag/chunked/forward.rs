@@ -13,31 +13,13 @@ use super::plan::MOST_CHUNKS;
 use super::record::{Announced, ChunkHead, Counts, NoRecord, RecordHead, pass, peek_whole, walk};
 use super::unpack::{Visitor, records, unpack};
 use crate::bag::decompress::{Allowance, Compression};
-use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Sink};
+use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Sink, damaged};
 use crate::bag::source::ByteStream;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
 
 /// The number of bytes searched at a time for the next record.
 const STRIDE: usize = 64 * 1024;
-
-/// The result of reading from the front.
-#[derive(Debug)]
-pub(super) struct ForwardScan {
-    pub(super) compression: BTreeSet<Compression>,
-    /// Whether the bag is not cut and nothing was skipped.
-    pub(super) complete: bool,
-}
-
-impl Default for ForwardScan {
-    /// Nothing read and nothing lost.
-    fn default() -> Self {
-        Self {
-            compression: BTreeSet::new(),
-            complete: true,
-        }
-    }
-}
 
 /// The messages of connections that are not described, or not yet.
 #[derive(Default)]
@@ -62,16 +44,15 @@ const MOST_EARLY: usize = 1 << 18;
 #[derive(Default)]
 struct Account {
     stated: Counts,
-    /// The chunks found by their positions, with the first and the last time in them.
+    /// The chunks found by their positions, with the first and the last time in those that were read whole.
     chunks: BTreeMap<u64, Option<(Stamp, Stamp)>>,
-    /// The numbers of chunks that the index lists: all, those found, and those found with the listed times.
-    listed: u64,
-    listed_found: usize,
-    listed_rightly: usize,
+    /// The chunks that the index lists, and whether one of them was found at other times than listed.
+    listed: BTreeSet<u64>,
+    is_misdated: bool,
 }
 
 impl Account {
-    /// Takes a chunk, with its times if all of it was read.
+    /// Takes a chunk that was found.
     fn find(&mut self, at: u64, times: Option<(Stamp, Stamp)>) {
         if self.chunks.len() < MOST_CHUNKS {
             self.chunks.insert(at, times);
@@ -79,47 +60,36 @@ impl Account {
     }
 
     /// Takes a chunk that the index lists.
-    fn list(&mut self, at: u64, (first, last): (Stamp, Stamp)) {
-        self.listed += 1;
-        if let Some(times) = self.chunks.get(&at) {
-            let is_right = times.is_none_or(|(low, high)| spans((low, high), (first, last)));
-            self.listed_found += 1;
-            self.listed_rightly += usize::from(is_right);
+    fn list(&mut self, at: u64, listed: (Stamp, Stamp)) {
+        if self.listed.len() < MOST_CHUNKS {
+            self.listed.insert(at);
         }
+        let times = self.chunks.get(&at).copied().flatten();
+        self.is_misdated |= times.is_some_and(|times| !spans(times, listed));
     }
 
-    /// The sentences about what a walk left unread, which found `messages` messages. What nothing states is not missed;
-    /// everything that the head, the summary or the index states is compared here and nowhere else.
-    fn unread(&self, messages: u64) -> impl Iterator<Item = String> + use<> {
-        // More than are compared are taken to be all.
-        let is_full = self.chunks.len() >= MOST_CHUNKS;
-        let chunks = if is_full {
-            u64::MAX
-        } else {
-            self.chunks.len() as u64
-        };
+    /// Says what a walk left unread, which found `messages` messages. What nothing states is not missed; everything that
+    /// the head, the summary or the index states is compared here and nowhere else.
+    fn unread(&self, messages: u64, mut say: impl FnMut(&str)) {
+        let stated = self.stated;
+        let chunks = self.chunks.len() as u64;
         let pairs = [
-            (self.stated.messages, messages, "messages"),
-            (
-                u64::from(self.stated.chunks).max(self.listed),
-                chunks,
-                "chunks",
-            ),
+            (stated.messages, messages, "messages"),
+            (stated.chunks.into(), chunks, "chunks"),
         ];
-        let fewer = pairs
-            .into_iter()
-            .filter(|(stated, found, _)| stated > found);
-        let fewer = fewer.map(|(stated, found, what)| {
-            format!("the bag should contain {stated} {what}; found {found}")
-        });
-        let is_elsewhere = self.listed > 0 && self.listed_found < self.chunks.len();
-        let is_at_other_times = self.listed_rightly < self.listed_found;
-        let others = [
-            (is_elsewhere, "its index does not list all of its chunks"),
-            (is_at_other_times, OTHER_TIMES),
-        ];
-        let others = others.into_iter().filter(|(is_true, _)| *is_true);
-        fewer.chain(others.map(|(_, text)| text.to_owned()))
+        for (stated, found, what) in pairs {
+            if stated > found && chunks < MOST_CHUNKS as u64 {
+                say(&format!(
+                    "the bag should contain {stated} {what}; found {found}"
+                ));
+            }
+        }
+        if !self.listed.is_empty() && !self.listed.iter().eq(self.chunks.keys()) {
+            say("its index lists other chunks than were found");
+        }
+        if self.is_misdated {
+            say(OTHER_TIMES);
+        }
     }
 }
 
@@ -129,7 +99,7 @@ pub(super) struct Walk<G> {
     announced: Announced<G>,
     found_messages: ChunkMessages,
     early: Early,
-    found: ForwardScan,
+    compression: BTreeSet<Compression>,
     allowance: Arc<Allowance>,
     account: Account,
     /// Whether the end of the data was reached, and the record that ends the file.
@@ -149,36 +119,29 @@ struct Forward<'a, G> {
     sink: &'a mut dyn Sink,
 }
 
-/// Whether more bytes may follow the end of a stream.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Growth {
-    Whole,
-    Growing,
-}
-
-/// Reads all of `stream` from the first record on; `size` is the length of the bag, 0 if unknown.
+/// Reads all of `stream` from the first record on; `size` is the length of the bag, 0 if unknown. Returns the compressions of
+/// its chunks; every loss is a notice.
 pub(super) fn read<G: Grammar>(
     stream: &mut ByteStream<'_>,
     size: u64,
     sink: &mut dyn Sink,
-) -> ForwardScan {
+) -> BTreeSet<Compression> {
     let mut walk = Walk::<G>::default();
-    let (stop, at) = walk.go(stream, size, Growth::Whole, sink);
+    let (stop, at) = walk.go(stream, size, false, sink);
     walk.finish(stop, at, sink)
 }
 
 impl<G: Grammar> Walk<G> {
-    /// Takes the records of `stream`; returns why they end and the position after the last one that was taken. In a growing
-    /// bag, a record that is not complete is left for later, unless a chunk follows it.
+    /// Takes the records of `stream`; returns why they end and the position after the last one that was taken. If the bag
+    /// `is_growing`, a record that is not complete is left for later, unless a chunk follows it.
     pub(super) fn go(
         &mut self,
         stream: &mut ByteStream<'_>,
         size: u64,
-        growth: Growth,
+        is_growing: bool,
         sink: &mut dyn Sink,
     ) -> (NoRecord, u64) {
         let mut forward = Forward { walk: self, sink };
-        let is_growing = growth == Growth::Growing;
         let mut at = stream.position();
         let stop = walk(stream, u64::MAX, |stream| {
             let from = stream.position();
@@ -211,7 +174,12 @@ impl<G: Grammar> Walk<G> {
     }
 
     /// Reports what the walk left unread, once it stopped at byte `at`.
-    pub(super) fn finish(mut self, stop: NoRecord, at: u64, sink: &mut dyn Sink) -> ForwardScan {
+    pub(super) fn finish(
+        mut self,
+        stop: NoRecord,
+        at: u64,
+        sink: &mut dyn Sink,
+    ) -> BTreeSet<Compression> {
         let mut forward = Forward {
             walk: &mut self,
             sink,
@@ -219,34 +187,29 @@ impl<G: Grammar> Walk<G> {
         forward.report_chunk();
         forward.name_early();
         let found = forward.walk.found_messages.messages;
-        for text in forward.walk.account.unread(found) {
-            forward.damage(&text);
-        }
+        let account = std::mem::take(&mut forward.walk.account);
+        account.unread(found, |text| forward.damage(text));
         let walk = forward.walk;
-        let (kind, text) = match stop {
-            NoRecord::End if !G::HAS_END => return self.found,
-            NoRecord::End | NoRecord::Cut | NoRecord::Broken if walk.closed => return self.found,
-            NoRecord::End | NoRecord::Cut | NoRecord::Broken if walk.ended => (
-                NoticeKind::Truncated,
-                format!("the bag is cut at byte {at}, behind its messages"),
-            ),
-            NoRecord::End => (
-                NoticeKind::Truncated,
-                format!("the bag was never finished; it ends at byte {at}"),
-            ),
-            NoRecord::Cut => (
-                NoticeKind::Truncated,
-                format!("the bag is cut at byte {at}"),
-            ),
-            NoRecord::Broken => (NoticeKind::Damaged, format!("no record at byte {at}")),
-            NoRecord::Io(e) => (
-                NoticeKind::Damaged,
-                format!("reading stopped at byte {at}: {e}"),
-            ),
+        let is_cut = !matches!(stop, NoRecord::Io(_));
+        let text = match &stop {
+            NoRecord::End if !G::HAS_END => return self.compression,
+            _ if walk.closed && is_cut => return self.compression,
+            _ if walk.ended && is_cut => {
+                format!("the bag is cut at byte {at}, behind its messages")
+            }
+            NoRecord::End => format!("the bag was never finished; it ends at byte {at}"),
+            NoRecord::Cut => format!("the bag is cut at byte {at}"),
+            NoRecord::Broken => format!("no record at byte {at}"),
+            NoRecord::Io(e) => format!("reading stopped at byte {at}: {e}"),
+        };
+        let is_broken = !is_cut || matches!(stop, NoRecord::Broken) && !walk.ended;
+        let kind = if is_broken {
+            NoticeKind::Damaged
+        } else {
+            NoticeKind::Truncated
         };
         forward.sink.notice(Notice::new(kind, text));
-        self.found.complete = false;
-        self.found
+        self.compression
     }
 }
 
@@ -262,11 +225,7 @@ impl<G: Grammar> Forward<'_, G> {
             self.walk.ended = false;
             self.damage("messages follow the end of the data");
         }
-        let is_tail = match record {
-            RecordHead::Tail { .. } | RecordHead::Total { .. } | RecordHead::Listed { .. } => true,
-            _ => false,
-        };
-        if is_tail && G::HAS_END && !self.walk.ended {
+        if record.is_of_the_end() && G::HAS_END && !self.walk.ended {
             self.damage("records that belong to the bag's end are among its messages");
         }
         match record {
@@ -275,7 +234,7 @@ impl<G: Grammar> Forward<'_, G> {
                 if self.walk.is_chunked && !G::IS_LOOSE {
                     self.damage("messages are outside of chunks");
                 }
-                self.walk.found.compression.insert(Compression::None);
+                self.walk.compression.insert(Compression::None);
                 self.message(stream, (raw, time, size))
             }
             RecordHead::Description { what, len } => self.description(stream, &what, len),
@@ -291,7 +250,7 @@ impl<G: Grammar> Forward<'_, G> {
             }
             RecordHead::DataEnd { len, crc } => {
                 self.walk.ended = true;
-                if crc.is_some_and(|crc| stream.sum().is_some_and(|sum| sum != crc)) {
+                if is_other(stream, crc) {
                     self.damage("the checksum of its data is wrong");
                 }
                 pass(stream, len)?;
@@ -327,8 +286,7 @@ impl<G: Grammar> Forward<'_, G> {
     ) -> Result<(), NoRecord> {
         (self.walk.ended, self.walk.closed) = (true, true);
         pass(stream, len.saturating_sub(4))?;
-        let is_wrong = |crc| crc != 0 && stream.sum().is_some_and(|sum| sum != crc);
-        if crc.is_some_and(is_wrong) {
+        if is_other(stream, crc) {
             self.damage("the checksum of its summary is wrong");
         }
         pass(stream, len.min(4))?;
@@ -365,7 +323,7 @@ impl<G: Grammar> Forward<'_, G> {
         self.report_chunk();
         self.walk.body = stream.position();
         self.walk.is_chunked = head.packed > 0;
-        self.walk.found.compression.extend(head.how);
+        self.walk.compression.extend(head.how);
         if head.misnamed {
             self.damage("a chunk is marked as another kind of record; it was read anyway");
         }
@@ -419,10 +377,7 @@ impl<G: Grammar> Forward<'_, G> {
         };
         let Some((id, _)) = self.walk.announced.get(raw) else {
             let lost = self.walk.early.index(raw, u64::from(count), &stamps);
-            if lost > 0 {
-                self.walk.found.complete = false;
-                absent(self.sink, lost);
-            }
+            absent(self.sink, lost);
             return pass(stream, len);
         };
         if self.walk.found_messages.is_of_another(id, &stamps) {
@@ -440,33 +395,23 @@ impl<G: Grammar> Forward<'_, G> {
         }
         let (mended, surplus) = self.walk.found_messages.report_all(self.sink);
         self.walk.early.take_back(mended);
-        if mended > 0 {
-            self.walk.found.complete = false;
-            absent(self.sink, mended);
-        }
-        if surplus > 0 {
-            self.walk.found.complete = false;
-            let text = "messages are in a chunk but not in its index";
-            self.sink
-                .notice(Notice::counted(NoticeKind::Damaged, surplus, text));
-        }
+        absent(self.sink, mended);
+        let text = "messages are in a chunk but not in its index";
+        damaged(self.sink, surplus, text);
     }
 
     fn damage(&mut self, text: &str) {
-        self.walk.found.complete = false;
-        self.sink.notice(Notice::new(NoticeKind::Damaged, text));
+        damaged(self.sink, 1, text);
     }
 
     /// Gives the messages of undescribed connections to connections that are named by their numbers.
     fn name_early(&mut self) {
         for (raw, run) in std::mem::take(&mut self.walk.early).runs {
-            if run.stamps.is_empty() {
-                continue;
+            if !run.stamps.is_empty() {
+                nameless(self.sink, run.stamps.len() as u64);
+                let id = self.walk.announced.unnamed(raw, self.sink);
+                self.described(id, &run);
             }
-            self.walk.found.complete = false;
-            nameless(self.sink, run.stamps.len() as u64);
-            let id = self.walk.announced.unnamed(raw, self.sink);
-            self.described(id, &run);
         }
     }
 
@@ -510,17 +455,21 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
         len: u64,
     ) -> Result<(), NoRecord> {
         let new = self.walk.announced.read(stream, (what, len), self.sink)?;
-        match new {
-            Err(_) => self.damage("the description of a connection cannot be read"),
-            Ok(Some((raw, id))) => {
-                if let Some(run) = self.walk.early.runs.remove(&raw) {
-                    self.described(Some(id), &run);
-                }
-            }
-            Ok(None) => {}
+        let Ok(new) = new else {
+            self.damage("the description of a connection cannot be read");
+            return Ok(());
+        };
+        let early = new.and_then(|(raw, id)| Some((id, self.walk.early.runs.remove(&raw)?)));
+        if let Some((id, run)) = early {
+            self.described(Some(id), &run);
         }
         Ok(())
     }
+}
+
+/// Whether the bytes taken have another checksum than stated.
+fn is_other(stream: &mut ByteStream<'_>, crc: Option<u32>) -> bool {
+    crc.zip(stream.sum()).is_some_and(|(stated, sum)| stated != sum)
 }
 
 /// Goes to the beginning of the next chunk after byte `from`; false if there is none before the end of the stream.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::forward::{self, Walk};
+use super::forward::Walk;
 use super::{Grammar, HEAD};
 use crate::bag::input::closed;
 use crate::bag::model::{Growing, Growth, Sink};
@@ -75,12 +75,7 @@ impl<G: Grammar> Growing for GrowingChunks<G> {
         if self.at == 0 {
             G::begin(&mut stream);
         }
-        let growth = if self.is_closed {
-            forward::Growth::Whole
-        } else {
-            forward::Growth::Growing
-        };
-        self.at = self.walk.go(&mut stream, 0, growth, sink).1;
+        self.at = self.walk.go(&mut stream, 0, !self.is_closed, sink).1;
         self.behind = self
             .last_bytes(&source)
             .map_err(Error::io("read", &self.path))?;

@@ -9,7 +9,7 @@ use super::Grammar;
 use super::record::{Connections, RecordHead};
 use crate::bag::adapters::MOST_CUTS;
 use crate::bag::decompress::{Allowance, Compression};
-use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want};
+use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want, damaged};
 use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::OUT_OF_ORDER_NS;
@@ -291,13 +291,16 @@ fn step(wanted: &[Wanted]) -> usize {
 /// Reports messages of a connection that the bag does not describe.
 pub(crate) fn nameless(sink: &mut dyn Sink, count: u64) {
     let text = "messages belong to a connection that the bag does not describe";
-    sink.notice(Notice::counted(NoticeKind::Damaged, count, text));
+    damaged(sink, count, text);
 }
 
 /// Reports messages that only the index has.
 pub(super) fn absent(sink: &mut dyn Sink, count: u64) {
-    let text = "messages are in the index but not in their chunk";
-    sink.notice(Notice::counted(NoticeKind::Damaged, count, text));
+    damaged(
+        sink,
+        count,
+        "messages are in the index but not in their chunk",
+    );
 }
 
 /// Passes on the wanted part of the message at the position of `stream`, and skips it.

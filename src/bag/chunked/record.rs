@@ -35,8 +35,8 @@ pub(crate) enum RecordHead<D> {
     /// The end of the data: no message follows. `crc` is the CRC-32 of all bytes of the bag before the `len` bytes, if
     /// it is stated.
     DataEnd { len: u64, crc: Option<u32> },
-    /// The end of the file: only the closing bytes of the bag follow. `crc` are its last four bytes: the CRC-32 of
-    /// all bytes between the end of the data and them, 0 for none.
+    /// The end of the file: only the closing bytes of the bag follow. `crc` is the CRC-32 of all bytes from the end of the
+    /// data up to the last four of this record, if it is stated.
     FileEnd { len: u64, crc: Option<u32> },
     /// A record that is ignored.
     Other { len: u64 },
@@ -48,6 +48,14 @@ pub(crate) enum RecordHead<D> {
 }
 
 impl<D> RecordHead<D> {
+    /// Whether it only occurs after the end of the data, in formats that state one.
+    pub(crate) fn is_of_the_end(&self) -> bool {
+        matches!(
+            self,
+            Self::Tail { .. } | Self::Total { .. } | Self::Listed { .. }
+        )
+    }
+
     /// The number of bytes that follow, all of them of this record.
     pub(crate) fn len(&self) -> u64 {
         match self {

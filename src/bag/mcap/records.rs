@@ -86,7 +86,9 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
         },
         op::FOOTER if len == FOOTER => RecordHead::FileEnd {
             len,
-            crc: FieldCursor(stream.peek(20)?.get(16..).unwrap_or_default()).u32(),
+            crc: FieldCursor(stream.peek(20)?.get(16..).unwrap_or_default())
+                .u32()
+                .filter(|crc| *crc != 0),
         },
         op::DATA_END | op::FOOTER => return Err(NoRecord::Broken),
         kind => RecordHead::Unknown {
