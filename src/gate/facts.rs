@@ -35,8 +35,6 @@ pub(crate) struct Facts<'a> {
     rates: Rates<'a>,
     /// The events of each node, but not those of its edges.
     events: ById<NodeId, Vec<&'a Event>>,
-    /// The time of the last message of each node that is not housekeeping.
-    last_sent: ById<NodeId, Option<Stamp>>,
     /// Whether the bag lists all subscribers.
     lists_all: bool,
 }
@@ -208,22 +206,12 @@ impl<'a> Facts<'a> {
                 events[id].push(event);
             }
         }
-        let mut last_sent: ById<NodeId, Option<Stamp>> = ById::like(&elements.nodes, None);
-        for sender in &mission.sending.senders {
-            if let Some(id) = sender.node
-                && !is_quiet(elements.topics[sender.topic].name.as_str())
-            {
-                let last = Sending::bounds([sender].into_iter()).map(|(_, last)| last);
-                last_sent[id] = last_sent[id].max(last);
-            }
-        }
         let lists_all = elements
             .subscribes
             .iter()
             .any(|edge| has(edge.seen.evidence, &LISTING) && !elements.nodes[edge.node].is_tool());
         Self {
             events,
-            last_sent,
             lists_all,
             mission,
             confidences,
@@ -618,7 +606,13 @@ impl<'a> Facts<'a> {
 
     /// The time of the last message of these nodes that is not housekeeping.
     pub(crate) fn last_sent(&self, nodes: &[NodeId]) -> Option<Stamp> {
-        nodes.iter().filter_map(|id| self.last_sent[*id]).max()
+        let sending = &self.mission.sending;
+        let senders = nodes.iter().flat_map(|id| {
+            let topics = self.wiring.published[*id].iter();
+            let topics = topics.filter(|topic| !self.is_housekeeping(**topic));
+            topics.filter_map(|topic| sending.of_edge(*id, *topic))
+        });
+        Some(Sending::bounds(senders)?.1)
     }
 
     /// The part of a window in which a topic with messages in `received` counts; `None` if it is too short.
