@@ -11,7 +11,7 @@ use super::inputs::each_once;
 use super::read::files;
 use super::times::MessageTimes;
 use super::{Stage, Watch};
-use crate::bag::{self, Input, OpenOptions, Reader, Report, Want, known_span};
+use crate::bag::{self, Input, OpenOptions, Reader, Want, known_span};
 use crate::base::error::{Error, Result};
 use crate::base::name::TopicName;
 use crate::base::notice::{Notice, NoticeKind, Notices};
@@ -152,11 +152,4 @@ fn stop(watch: &dyn Watch) -> Result<()> {
         return Err(Error::Interrupted);
     }
     Ok(())
-}
-
-/// The notice about losses of a bag that reported none.
-pub(super) fn of_report(report: &Report, notices: &Notices) -> Option<Notice> {
-    use crate::base::notice::NoticeKind::Damaged;
-    let silent = !report.complete && !notices.any_loss();
-    silent.then(|| Notice::new(Damaged, format!("`{}` is not complete", report.name)))
 }

@@ -5,11 +5,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::Watch;
-use super::extract::of_report;
 use crate::bag::{Connection, ConnectionId, Reader, Report, Sink, Want};
 use crate::base::error::{Error, Result};
 use crate::base::name::{NodeName, TopicName};
-use crate::base::notice::{Notice, Notices};
+use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::clock;
 use crate::evidence::times::{SeriesId, Stamps, Timed};
@@ -141,4 +140,15 @@ impl Sink for OfBag<'_, '_> {
     fn progress(&mut self, done: u64, total: u64) {
         self.watch.progress(done, total);
     }
+}
+
+/// The notice about losses of a bag that reported none.
+pub(super) fn of_report(report: &Report, notices: &Notices) -> Option<Notice> {
+    let silent = !report.complete && !notices.any_loss();
+    silent.then(|| {
+        Notice::new(
+            NoticeKind::Damaged,
+            format!("`{}` is not complete", report.name),
+        )
+    })
 }

@@ -151,8 +151,10 @@ fn all_commands_agree_on_what_was_lost() {
             code,
             "{name}: {said}"
         );
-        let written = fs::read_to_string(&json).unwrap_or_default();
-        assert_eq!(messages(&written), messages(&said), "{name}");
+        if code != Some(1) {
+            let written = fs::read_to_string(&json).unwrap();
+            assert_eq!(messages(&written), messages(&said), "{name}");
+        }
         // These read more than an index.
         for rest in [
             vec!["extract", &path, "-o", &to("x.csv")],

@@ -170,8 +170,6 @@ impl<G: Grammar> Query<'_, G> {
     }
 }
 
-pub(super) const OTHER_TIMES: &str =
-    "chunks begin or end at other times than the bag's index states";
 const APART: &str = "chunks differ in position or length from the bag's index";
 
 /// The index of a chunk.

@@ -7,8 +7,7 @@ use std::sync::Arc;
 
 use super::Grammar;
 use super::check::{Behind, ChunkMessages};
-use super::chunk::OTHER_TIMES;
-use super::index::{absent, hand_over, nameless, spans};
+use super::index::{OTHER_TIMES, absent, hand_over, nameless, spans};
 use super::plan::MOST_CHUNKS;
 use super::record::{Announced, ChunkHead, Counts, NoRecord, RecordHead, pass, peek_whole, walk};
 use super::unpack::{Visitor, records, unpack};
@@ -469,7 +468,8 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
 
 /// Whether the bytes taken have another checksum than stated.
 fn is_other(stream: &mut ByteStream<'_>, crc: Option<u32>) -> bool {
-    crc.zip(stream.sum()).is_some_and(|(stated, sum)| stated != sum)
+    crc.zip(stream.sum())
+        .is_some_and(|(stated, sum)| stated != sum)
 }
 
 /// Goes to the beginning of the next chunk after byte `from`; false if there is none before the end of the stream.

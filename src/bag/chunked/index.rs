@@ -288,6 +288,10 @@ fn step(wanted: &[Wanted]) -> usize {
     if between <= NEAR as u64 { CLOSE } else { NEAR }
 }
 
+/// The notice about other times.
+pub(super) const OTHER_TIMES: &str =
+    "chunks begin or end at other times than the bag's index states";
+
 /// Reports messages of a connection that the bag does not describe.
 pub(crate) fn nameless(sink: &mut dyn Sink, count: u64) {
     let text = "messages belong to a connection that the bag does not describe";

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, BufWriter};
 
-use super::{Extract, Extracted, definitions, of_report, stop};
+use super::{Extract, Extracted, definitions, stop};
 use crate::bag::{Connection, ConnectionId, Input, Message, Sink, Want};
 use crate::base::error::{Error, Result};
 use crate::base::name::{NodeName, TopicName};
@@ -19,6 +19,7 @@ use crate::export::tables::folder::{Folder, Part, file_stem};
 use crate::export::tables::writer::begin;
 use crate::pipeline::Watch;
 use crate::pipeline::collect::no_messages;
+use crate::pipeline::times::of_report;
 use crate::view::none_pass;
 
 /// The columns before a message's fields: its log time, and its publisher if known.
