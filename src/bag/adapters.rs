@@ -7,7 +7,7 @@ use std::thread;
 use crate::bag::model::{ConnectionId, Message, Reader, Sink};
 use crate::base::error::Result;
 use crate::base::ids::ById;
-use crate::base::notice::Notice;
+use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::OUT_OF_ORDER_NS;
 use crate::base::time::{Span, Stamp};
 
@@ -17,6 +17,8 @@ pub(crate) struct Clip<'a> {
     sink: &'a mut dyn Sink,
     /// Whether a notice reported skipped data.
     pub(crate) lost: bool,
+    /// Whether one reported that the end is missing.
+    pub(crate) is_cut: bool,
 }
 
 impl<'a> Clip<'a> {
@@ -26,6 +28,7 @@ impl<'a> Clip<'a> {
             range,
             sink,
             lost: false,
+            is_cut: false,
         }
     }
 }
@@ -59,6 +62,7 @@ impl Sink for Clip<'_> {
 
     fn notice(&mut self, notice: Notice) {
         self.lost |= notice.kind.is_loss();
+        self.is_cut |= notice.kind == NoticeKind::Truncated;
         self.sink.notice(notice);
     }
 }

@@ -278,7 +278,7 @@ impl<G: Grammar> Indexed<G> {
         };
         sink.notice(Notice::new(kind, text));
         let compression = self.forward(sink);
-        if reason.fault == Fault::Cut && !sink.lost {
+        if reason.fault == Fault::Cut && !sink.is_cut {
             // Cut exactly between records, so only the head reveals it.
             let text = "the end of the bag is missing";
             sink.notice(Notice::new(NoticeKind::Truncated, text));

@@ -75,7 +75,11 @@ impl<G: Grammar> Growing for GrowingChunks<G> {
         if self.at == 0 {
             G::begin(&mut stream);
         }
-        self.at = self.walk.go(&mut stream, 0, !self.is_closed, sink).1;
+        let (stop, at) = self.walk.go(&mut stream, 0, !self.is_closed, sink);
+        self.at = at;
+        if self.is_closed {
+            std::mem::take(&mut self.walk).finish(stop, at, sink);
+        }
         self.behind = self
             .last_bytes(&source)
             .map_err(Error::io("read", &self.path))?;
