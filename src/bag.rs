@@ -27,12 +27,12 @@ use std::path::{Path, PathBuf};
 
 use crate::base::error::{Error, Result};
 
-pub(crate) use adapters::{Bounds, known_span};
+pub(crate) use adapters::known_span;
 pub(crate) use deferred::open_each;
 pub(crate) use folder::{Recording, parts_of, plain, recordings, written};
 pub(crate) use input::BagPlace;
 pub use input::{FormatRow, Input, file_name, size_on_disk};
-use input::{closed, head, place};
+use input::{HEAD, SEARCHED, closed, head, last, place};
 pub(crate) use model::Growing;
 #[doc(hidden)]
 pub use model::Growth;
@@ -70,13 +70,23 @@ pub fn sniff(input: &Input) -> Result<InputKind> {
         _ => return Ok(InputKind::Bag(&FORMATS[0])),
     };
     let mut place = place(input)?;
-    let head = head(&mut place)?;
+    let head = head(&mut place, HEAD)?;
     let json = head.trim_ascii_start().first() == Some(&b'{');
-    match FORMATS.iter().find(|f| (f.sniff)(&place, &head)) {
+    match recognized(&mut place, &head)? {
         Some(row) => Ok(InputKind::Bag(row)),
         None if json => Ok(InputKind::Json),
         None => Err(explain(path, &head, path.is_dir())),
     }
+}
+
+/// The format of an input: by its first bytes or, if these are of no known kind, by a chunk behind them or its last ones.
+fn recognized(place: &mut BagPlace, head: &[u8]) -> Result<Option<&'static FormatRow>> {
+    let row = FORMATS.iter().find(|row| (row.sniff)(place, head));
+    if row.is_some() || unknown::is_known(head) {
+        return Ok(row);
+    }
+    let bytes = [&input::head(place, SEARCHED)?[..], &last(place)].concat();
+    Ok(FORMATS.iter().find(|row| (row.is_inside)(&bytes)))
 }
 
 /// Opens a bag of any format, recognized by its first bytes.
@@ -86,8 +96,8 @@ pub fn sniff(input: &Input) -> Result<InputKind> {
 /// [`Error::Malformed`], with a hint, if no content can be read.
 pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     let mut place = place(input)?;
-    let head = head(&mut place)?;
-    if let Some(row) = FORMATS.iter().find(|f| (f.sniff)(&place, &head)) {
+    let head = head(&mut place, HEAD)?;
+    if let Some(row) = recognized(&mut place, &head)? {
         return (row.open)(place, options);
     }
     let path = match input {

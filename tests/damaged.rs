@@ -1,5 +1,7 @@
 //! Tests of damaged and manipulated bags: intact data is read, nothing is invented, and losses are reported.
 
+#[cfg(unix)]
+mod agreement;
 mod every_byte;
 
 use std::fs;

@@ -1,12 +1,13 @@
 //! Sinks between a reader and its target sink: clipping to a range, batching, crossing threads.
 
+use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
 use crate::bag::model::{ConnectionId, Message, Reader, Sink};
 use crate::base::error::Result;
 use crate::base::ids::ById;
-use crate::base::notice::Notice;
+use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::OUT_OF_ORDER_NS;
 use crate::base::time::{Span, Stamp};
 
@@ -16,6 +17,8 @@ pub(crate) struct Clip<'a> {
     sink: &'a mut dyn Sink,
     /// Whether a notice reported skipped data.
     pub(crate) lost: bool,
+    /// Whether one reported that the end is missing.
+    pub(crate) is_cut: bool,
 }
 
 impl<'a> Clip<'a> {
@@ -25,6 +28,7 @@ impl<'a> Clip<'a> {
             range,
             sink,
             lost: false,
+            is_cut: false,
         }
     }
 }
@@ -58,6 +62,7 @@ impl Sink for Clip<'_> {
 
     fn notice(&mut self, notice: Notice) {
         self.lost |= notice.kind.is_loss();
+        self.is_cut |= notice.kind == NoticeKind::Truncated;
         self.sink.notice(notice);
     }
 }
@@ -107,8 +112,8 @@ pub(crate) struct Gather {
     last: Stamp,
     /// For each point at which time went back, the number of stamps batched per connection.
     cuts: Vec<ById<ConnectionId, usize>>,
-    /// Whether some stamps were flushed early.
-    spilled: bool,
+    /// The numbers of stamps that were passed on before [`Gather::flush`].
+    spilled: BTreeMap<ConnectionId, u64>,
 }
 
 /// The most points in one batch at which time goes back that are reported; with more, messages are merely out
@@ -134,18 +139,18 @@ impl Gather {
         run.1.push(size);
         self.held += 1;
         if self.held >= MOST_GATHERED {
-            self.flush(sink);
-            self.spilled = true;
+            self.spill(sink);
         }
     }
 
-    /// The number of messages batched for a connection.
+    /// The number of messages added for a connection.
     pub(crate) fn count(&self, id: ConnectionId) -> u64 {
         let run = self.runs.get(id);
-        run.map_or(0, |run| run.0.len() as u64)
+        let spilled = self.spilled.get(&id).copied().unwrap_or(0);
+        run.map_or(0, |run| run.0.len() as u64) + spilled
     }
 
-    /// Whether exactly these stamps are batched for a connection, in any order.
+    /// Whether exactly these stamps are batched for a connection, in any order, as far as they are still here.
     pub(crate) fn holds(&self, id: ConnectionId, stamps: &[Stamp]) -> bool {
         let held = self.runs.get(id).map_or(&[][..], |run| &run.0);
         let sorted = |stamps: &[Stamp]| {
@@ -153,13 +158,15 @@ impl Gather {
             stamps.sort_unstable();
             stamps
         };
-        held == stamps || held.len() == stamps.len() && sorted(held) == sorted(stamps)
+        !self.spilled.is_empty()
+            || held == stamps
+            || held.len() == stamps.len() && sorted(held) == sorted(stamps)
     }
 
     /// Drops the stamps batched for a connection; returns their number, or `None` if some were already
-    /// flushed.
+    /// passed on.
     pub(crate) fn take(&mut self, id: ConnectionId) -> Option<u64> {
-        if self.spilled {
+        if !self.spilled.is_empty() {
             return None;
         }
         let Some(run) = self.runs.get_mut(id) else {
@@ -191,10 +198,22 @@ impl Gather {
         gone as u64
     }
 
-    /// Passes on all batched stamps, by connection.
+    /// Passes on all batched stamps, by connection, and begins another batch.
     pub(crate) fn flush(&mut self, sink: &mut dyn Sink) {
+        self.deliver(sink);
+        self.spilled.clear();
+    }
+
+    /// Passes on what is batched so far, which still counts.
+    pub(crate) fn spill(&mut self, sink: &mut dyn Sink) {
+        for id in &self.touched {
+            *self.spilled.entry(*id).or_default() += self.runs[*id].0.len() as u64;
+        }
+        self.deliver(sink);
+    }
+
+    fn deliver(&mut self, sink: &mut dyn Sink) {
         self.touched.sort_unstable();
-        self.spilled = false;
         let mut from = ById::like(&self.runs, 0);
         let whole = self.runs.iter().map(|run| run.0.len()).collect();
         for to in self.cuts.drain(..).chain([whole]) {

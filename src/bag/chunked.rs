@@ -20,7 +20,7 @@ use std::sync::Arc;
 use crate::bag::adapters::{Clip, GROUP, in_order, share};
 use crate::bag::decompress::Compression;
 use crate::bag::input::{BagPlace, file_name};
-use crate::bag::model::{Connection, OpenOptions, Reader, Report, Sink, Tier, Want};
+use crate::bag::model::{Connection, OpenOptions, Reader, Report, Sink, Tier, Want, damaged};
 use crate::bag::source::{ByteStream, FAR, FileSource};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
@@ -31,7 +31,9 @@ pub(crate) use growing::follow;
 use index::Query;
 pub(crate) use index::{ChunkBody, Index, IndexSum, LONGEST_INDEX};
 pub(crate) use plan::{Chunk, ChunkPlan, Fault, MOST_CHUNKS, Unindexed, Used};
-pub(crate) use record::{ChunkHead, Connections, NoRecord, RecordHead, SecondFinds, pass, walk};
+pub(crate) use record::{
+    ChunkHead, Connections, Counts, NoRecord, RecordHead, SecondFinds, pass, walk,
+};
 
 /// The parser for one format of chunked bags. A value keeps the state that later descriptions depend on.
 pub(crate) trait Grammar: Default + Send + 'static {
@@ -41,6 +43,8 @@ pub(crate) trait Grammar: Default + Send + 'static {
     const HAS_END: bool;
     /// Whether messages may also be outside chunks.
     const IS_LOOSE: bool;
+    /// The first bytes of a bag.
+    const OPENING: &'static [u8];
     /// The bytes after that record.
     const CLOSING: &'static [u8];
     /// The head of a description record.
@@ -115,6 +119,8 @@ struct Indexed<G> {
     source: FileSource,
     plan: Result<ChunkPlan, Unindexed>,
     facts: Vec<(String, String)>,
+    /// Whether its first bytes are those of a bag.
+    is_opened: bool,
     verify: bool,
     grammar: PhantomData<fn() -> G>,
 }
@@ -146,6 +152,7 @@ pub(crate) fn open<G: Grammar>(place: BagPlace, options: &OpenOptions) -> Result
                 source,
                 plan,
                 facts,
+                is_opened: head.starts_with(G::OPENING),
                 verify: options.verify,
                 grammar,
             }))
@@ -202,6 +209,7 @@ impl<G: Grammar> Reader for Indexed<G> {
             self.span()?;
         }
         let mut sink = Clip::new(range, sink);
+        opened(self.is_opened, &mut sink);
         let report = match &self.plan {
             _ if self.verify => self.by_the_second_reader(&mut sink),
             Ok(plan) => self.by_index(plan, range, &mut sink),
@@ -260,7 +268,7 @@ impl<G: Grammar> Indexed<G> {
         }
     }
 
-    fn front_to_back(&self, reason: &Unindexed, sink: &mut dyn Sink) -> Report {
+    fn front_to_back(&self, reason: &Unindexed, sink: &mut Clip<'_>) -> Report {
         let text = format!("read from the front, since {}", reason.why);
         let is_wrong = reason.fault == Fault::Wrong;
         let kind = if is_wrong {
@@ -269,18 +277,16 @@ impl<G: Grammar> Indexed<G> {
             NoticeKind::Downgraded
         };
         sink.notice(Notice::new(kind, text));
-        let mut found = self.forward(sink);
-        found.complete &= !is_wrong;
-        if reason.fault == Fault::Cut && found.complete {
+        let compression = self.forward(sink);
+        if reason.fault == Fault::Cut && !sink.is_cut {
             // Cut exactly between records, so only the head reveals it.
-            found.complete = false;
             let text = "the end of the bag is missing";
             sink.notice(Notice::new(NoticeKind::Truncated, text));
         }
         Report {
-            complete: found.complete,
+            complete: !sink.lost,
             tier_reason: Some(reason.why.clone()),
-            ..self.report(Tier::Forward, &found.compression)
+            ..self.report(Tier::Forward, &compression)
         }
     }
 
@@ -301,18 +307,18 @@ impl<G: Grammar> Indexed<G> {
                 ..self.report(Tier::Verify, &verified.compression)
             };
         }
-        let found = self.forward(sink);
+        let compression = self.forward(sink);
         Report {
             // Without an index, the first reading did the same.
-            complete: found.complete && self.plan.is_ok(),
+            complete: !sink.lost && self.plan.is_ok(),
             tier_reason: Some(format!(
                 "the second reader cannot read it ({why}); read from the front instead"
             )),
-            ..self.report(Tier::Verify, &found.compression)
+            ..self.report(Tier::Verify, &compression)
         }
     }
 
-    fn forward(&self, sink: &mut dyn Sink) -> forward::ForwardScan {
+    fn forward(&self, sink: &mut dyn Sink) -> BTreeSet<Compression> {
         let mut stream = ByteStream::of_file(&self.source, 0, self.source.len(), FAR);
         // Reading bytes that could be skipped pays off only if no damage is known yet.
         let is_sound = matches!(&self.plan, Err(reason) if reason.fault == Fault::Missing);
@@ -326,6 +332,17 @@ impl<G: Grammar> Indexed<G> {
     fn report(&self, tier: Tier, compression: &BTreeSet<Compression>) -> Report {
         report::<G>(file_name(self.source.path()), tier, compression)
     }
+}
+
+/// Reports that the first bytes of a bag are damaged.
+fn opened(is_opened: bool, sink: &mut dyn Sink) {
+    let text = "its first bytes are not those of a bag";
+    damaged(sink, u64::from(!is_opened), text);
+}
+
+/// Whether a chunk begins near the beginning of these bytes, of a bag whose first bytes are damaged.
+pub(crate) fn has_chunk<G: Grammar>(bytes: &[u8]) -> bool {
+    (0..bytes.len()).any(|at| G::is_chunk(&bytes[at..]))
 }
 
 /// A report with the values common to all tiers.
@@ -349,13 +366,17 @@ impl<G: Grammar> Reader for Piped<G> {
         if G::is_summed(None) {
             self.stream.sum_up();
         }
+        let head = self.stream.peek(G::OPENING.len());
+        let is_opened = head.is_ok_and(|head| head == G::OPENING);
+        let mut sink = Clip::new(range, sink);
+        opened(is_opened, &mut sink);
         G::begin(&mut self.stream);
-        let found = forward::read::<G>(&mut self.stream, 0, &mut Clip::new(range, sink));
+        let compression = forward::read::<G>(&mut self.stream, 0, &mut sink);
         Ok(Report {
-            complete: found.complete,
+            complete: !sink.lost,
             tier_reason: Some("a pipe has no index".to_owned()),
             bytes_read: self.stream.position(),
-            ..report::<G>(self.name.clone(), Tier::Forward, &found.compression)
+            ..report::<G>(self.name.clone(), Tier::Forward, &compression)
         })
     }
 }

@@ -218,6 +218,7 @@ fn lz4<'a>(mut from: impl Read + Send + 'a) -> io::Result<Box<dyn Read + Send + 
         return Ok(Box::new(Blocks {
             from,
             checksums: head[4] & 0b1_0000 != 0,
+            is_summed: head[4] & 0b100 != 0,
             packed: Vec::new(),
             plain: vec![0; largest],
             ready: 0..0,
@@ -233,6 +234,8 @@ struct Blocks<R> {
     from: R,
     /// Whether each block is followed by a checksum, which is ignored.
     checksums: bool,
+    /// Whether a checksum of the content follows the last block, which is ignored too.
+    is_summed: bool,
     packed: Vec<u8>,
     plain: Vec<u8>,
     /// The part of `plain` that has not been read yet.
@@ -247,6 +250,9 @@ impl<R: Read> Blocks<R> {
         let head = u32::from_le_bytes(head);
         let (stored, len) = (head >> 31 == 1, (head & 0x7fff_ffff) as usize);
         self.ended = len == 0;
+        if self.ended && self.is_summed {
+            io::copy(&mut self.from.by_ref().take(4), &mut io::sink())?;
+        }
         if len > self.plain.len() {
             return Err(io::Error::new(
                 io::ErrorKind::InvalidData,

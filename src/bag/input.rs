@@ -85,6 +85,8 @@ pub struct FormatRow {
     pub(crate) needs_file: bool,
     /// Whether an input's first bytes are those of such a bag.
     pub(crate) sniff: fn(&BagPlace, &[u8]) -> bool,
+    /// Whether the first and last bytes of an input of no known kind are those of such a bag whose very first are damaged.
+    pub(crate) is_inside: fn(&[u8]) -> bool,
     /// Opens a reader.
     pub(crate) open: fn(BagPlace, &OpenOptions) -> Result<Box<dyn Reader>>,
     /// Opens a reader of a bag that is still being written.
@@ -124,21 +126,34 @@ pub(crate) fn place(input: &Input) -> Result<BagPlace> {
     Ok(BagPlace::Pipe(file_name(path), ByteStream::of_reader(pipe)))
 }
 
-/// The first bytes; empty for a folder.
-pub(crate) fn head(place: &mut BagPlace) -> Result<Vec<u8>> {
+/// The first bytes, at most so many; none of a folder.
+pub(crate) fn head(place: &mut BagPlace, most: usize) -> Result<Vec<u8>> {
     match place {
         BagPlace::Folder(_) => Ok(Vec::new()),
         BagPlace::File(source) => {
-            let mut head = vec![0; HEAD];
+            let mut head = vec![0; most];
             let got = source.read_at(0, &mut head);
             head.truncate(got.map_err(Error::io("read", source.path()))?);
             Ok(head)
         }
         BagPlace::Pipe(name, stream) => {
-            let head = stream.peek(HEAD).map(<[u8]>::to_vec);
+            let head = stream.peek(most).map(<[u8]>::to_vec);
             head.map_err(Error::io("read", Path::new(name)))
         }
     }
+}
+
+/// The number of first bytes that are searched for a chunk where the very first are damaged.
+pub(crate) const SEARCHED: usize = 1 << 20;
+
+/// The last bytes of a file; none of anything else.
+pub(crate) fn last(place: &BagPlace) -> [u8; 8] {
+    let mut last = [0; 8];
+    if let BagPlace::File(source) = place {
+        // Without them, the first ones decide.
+        let _ = source.read_at(source.len().saturating_sub(8), &mut last);
+    }
+    last
 }
 
 /// The new name of a bag that no longer exists under the name it had while recording: a recorder drops `.active`

@@ -31,6 +31,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     extensions: &["mcap"],
     needs_file: false,
     sniff: |_, head| head.starts_with(MAGIC),
+    is_inside: |bytes| bytes.ends_with(MAGIC) || chunked::has_chunk::<Mcap>(bytes),
     open: chunked::open::<Mcap>,
     follow: Some(chunked::follow::<Mcap>),
 };
@@ -53,6 +54,7 @@ impl Grammar for Mcap {
     const NAME: &'static str = FORMAT.name;
     const HAS_END: bool = true;
     const IS_LOOSE: bool = true;
+    const OPENING: &'static [u8] = MAGIC;
     const CLOSING: &'static [u8] = MAGIC;
     type Description = Described;
 

@@ -225,8 +225,8 @@ pub enum Growth {
     Ended,
 }
 
-/// A recording that is read while it is written. Every message is reported once, as soon as it is complete.
-/// Lost or damaged data is only detected when the closed recording is read.
+/// A recording that is read while it is written. Every message is reported once, as soon as it is complete, and damage
+/// as soon as it is passed; what is missing at the end shows when the closed recording is read.
 pub(crate) trait Growing: Send {
     /// Reports to `sink` what has become readable since the last call.
     ///
@@ -248,7 +248,14 @@ pub struct OpenOptions {
 /// The longest payload or connection record kept in memory, in bytes.
 pub(crate) const MOST_PAYLOAD: usize = 16 << 20;
 
+/// Reports damage to `sink`, as often as it occurred.
+pub(crate) fn damaged(sink: &mut dyn Sink, count: u64, text: &str) {
+    if count > 0 {
+        sink.notice(Notice::counted(NoticeKind::Damaged, count, text));
+    }
+}
+
 /// Reports to `sink` that data was lost because of a system error.
 pub(crate) fn lost(sink: &mut dyn Sink, what: &str, why: &io::Error) {
-    sink.notice(Notice::new(NoticeKind::Damaged, format!("{what}: {why}")));
+    damaged(sink, 1, &format!("{what}: {why}"));
 }

@@ -27,7 +27,8 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     what: "ROS 1 bag",
     extensions: &["bag", "bag.active"],
     needs_file: false,
-    sniff: |_, head| head.starts_with(b"#ROSBAG V2.") || head.starts_with(b"#ROSRECORD V"),
+    sniff: |_, head| head.starts_with(Rosbag1::OPENING) || head.starts_with(b"#ROSRECORD V"),
+    is_inside: chunked::has_chunk::<Rosbag1>,
     open: chunked::open::<Rosbag1>,
     follow: Some(chunked::follow::<Rosbag1>),
 };
@@ -49,12 +50,13 @@ impl Grammar for Rosbag1 {
     const NAME: &'static str = FORMAT.name;
     const HAS_END: bool = false;
     const IS_LOOSE: bool = false;
+    const OPENING: &'static [u8] = b"#ROSBAG V2.";
     const CLOSING: &'static [u8] = b"";
     type Description = Described;
 
     /// Refuses bags older than version 2, and encrypted ones.
     fn accept(path: &Path, head: &[u8]) -> Result<()> {
-        if head.starts_with(b"#ROSBAG V2.") {
+        if !head.starts_with(b"#ROSRECORD V") {
             return refuse_encrypted(path, head);
         }
         let line = head.split(|b| *b == b'\n').next().unwrap_or_default();

@@ -28,6 +28,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     what: "ROS 2 recording: a folder with metadata.yaml, or with the parts of one recording",
     extensions: &[],
     needs_file: false,
+    is_inside: |_| false,
     sniff: |place, _| matches!(place, BagPlace::Folder(_)),
     open,
     follow: Some(growing::follow),

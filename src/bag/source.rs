@@ -24,6 +24,11 @@ impl FileSource {
     /// # Errors
     /// An error of the system.
     pub(crate) fn open(path: &Path) -> Result<Self> {
+        // Opening a pipe would wait for its writer.
+        if !path.metadata().map_err(Error::io("read", path))?.is_file() {
+            let error = io::Error::other("it is not a regular file");
+            return Err(Error::io("read", path)(error));
+        }
         let file = File::open(path).map_err(Error::io("read", path))?;
         let len = file.metadata().map_err(Error::io("read", path))?.len();
         Ok(Self {
@@ -143,6 +148,9 @@ pub(crate) struct ByteStream<'a> {
     summed: usize,
 }
 
+/// The most bytes of a pipe that are read ahead to find whether a record is whole.
+const MOST_AHEAD: usize = 16 << 20;
+
 /// The step for sequential reading.
 pub(crate) const FAR: usize = 256 * 1024;
 /// The step for picking small records here and there.
@@ -212,6 +220,19 @@ impl<'a> ByteStream<'a> {
         Ok(&self.buffer[self.used..end])
     }
 
+    /// Whether `len` more bytes follow. Where only reading shows this, more than [`MOST_AHEAD`] are taken to follow if these
+    /// do: a damaged length hardly ever is between.
+    ///
+    /// # Errors
+    /// As [`ByteStream::peek`].
+    pub(crate) fn has(&mut self, len: u64) -> io::Result<bool> {
+        if let Some(left) = self.left() {
+            return Ok(left >= len);
+        }
+        let len = usize::try_from(len).map_or(MOST_AHEAD, |len| len.min(MOST_AHEAD));
+        Ok(self.peek(len)?.len() == len)
+    }
+
     /// The number of remaining bytes, if known without reading.
     pub(crate) fn left(&self) -> Option<u64> {
         match self.from {
@@ -254,6 +275,12 @@ impl<'a> ByteStream<'a> {
             self.filled += got;
         }
         Ok(())
+    }
+
+    /// Goes back to byte `at` of a file.
+    pub(crate) fn back(&mut self, at: u64) {
+        self.at = at;
+        (self.used, self.filled) = (0, 0);
     }
 
     /// Takes `n` bytes that were peeked at.

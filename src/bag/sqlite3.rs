@@ -32,6 +32,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     what: "ROS 2 bag in SQLite",
     extensions: &["db3"],
     needs_file: true,
+    is_inside: |_| false,
     sniff: |_, head| head.starts_with(b"SQLite format 3\0"),
     open,
     follow: Some(growing::follow),

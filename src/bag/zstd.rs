@@ -21,6 +21,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     what: "any of these, compressed as a whole",
     extensions: &["db3.zstd", "mcap.zstd"],
     needs_file: false,
+    is_inside: |_| false,
     sniff: |_, head| head.starts_with(b"\x28\xb5\x2f\xfd"),
     open,
     follow: None,

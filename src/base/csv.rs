@@ -7,7 +7,7 @@ use csv::{ReaderBuilder, Terminator, WriterBuilder};
 
 use super::cast::to_f32;
 use super::table::{Batch, ColumnKind, ColumnValues, TableColumn, TableWriter, span};
-use super::words::visible;
+use super::words::{is_invisible, visible};
 
 /// Writes a table: the column names, then one row per line. Lists are written as JSON with `NaN` and `Infinity`, which
 /// Python and JavaScript accept; unknown values are empty.
@@ -159,7 +159,9 @@ where
 pub(crate) fn cell(text: &str, is_data: bool) -> Cow<'_, str> {
     let signs = ['=', '+', '-', '@', '\t', '\r', '＝', '＋', '－', '＠'];
     let is_number = || !text.starts_with('+') && text.parse::<f64>().is_ok();
-    let is_formula = text.trim_start_matches(' ').starts_with(signs) && !is_number();
+    // Spreadsheets pass over blanks of every kind.
+    let is_blank = |c| c == ' ' || !signs.contains(&c) && is_invisible(c);
+    let is_formula = text.trim_start_matches(is_blank).starts_with(signs) && !is_number();
     let shown = if is_data { text.into() } else { visible(text) };
     if is_formula {
         format!("'{shown}").into()

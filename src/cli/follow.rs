@@ -9,7 +9,7 @@ use super::render;
 use super::show::NO_EVENTS;
 use super::terminal::Terminal;
 use super::values::{one_of, period};
-use super::{DONE, code, gate};
+use super::{DONE, SKIPPED, code, gate};
 use crate::bag::Growth;
 use crate::base::error::Result;
 use crate::base::time::Period;
@@ -163,7 +163,7 @@ impl Follower<'_> {
         let (mut grew, mut known, mut appeared) = (terminal.seconds(), 0, None);
         let (mut is_behind, mut is_unchecked) = (false, false);
         let idle = self.args.idle.map(|idle| idle.nanos() as f64 / 1e9);
-        loop {
+        let is_complete = loop {
             let growth = self.follow.poll()?;
             let now = terminal.seconds();
             if growth == Growth::More {
@@ -185,7 +185,7 @@ impl Follower<'_> {
                 is_behind = false;
                 appeared = appeared.filter(|_| !is_settled);
                 if !self.print_events(terminal)? {
-                    break;
+                    break false;
                 }
             }
             if is_unchecked && (is_over || now >= self.checks.due) {
@@ -196,11 +196,11 @@ impl Follower<'_> {
                 terminal.status(&format!("nothing was written for {idle}"));
             }
             if is_over {
-                break;
+                break growth == Growth::Ended || is_idle;
             }
             terminal.wait();
-        }
-        self.end(terminal)
+        };
+        self.end(is_complete, terminal)
     }
 
     /// Prints the new events; false if standard output was closed.
@@ -229,17 +229,22 @@ impl Follower<'_> {
         terminal.log(&lines?, format).map(drop)
     }
 
-    /// Checks the recording as it is now and writes the outputs.
-    fn end(self, terminal: &mut Terminal) -> Result<u8> {
+    /// Checks the recording as it is now and writes the outputs. Nothing more is expected of a complete one.
+    fn end(self, is_complete: bool, terminal: &mut Terminal) -> Result<u8> {
         terminal.note_signals(false);
         if self.is_silent {
             terminal.note(NO_EVENTS);
+        }
+        let mut done = DONE;
+        if self.job.outputs.is_empty() && self.args.expect.is_none() {
+            let losses = self.follow.losses(is_complete)?;
+            terminal.notices(&losses);
+            done = if losses.is_empty() { DONE } else { SKIPPED };
         }
         let job = Render {
             reading: self.follow.closed(),
             ..self.job
         };
-        let mut done = DONE;
         if !job.outputs.is_empty() {
             let rendered = crate::pipeline::render(&job, terminal)?;
             render::report(&rendered, terminal);

@@ -6,6 +6,7 @@ use std::io;
 
 use crate::base::budget;
 use crate::base::ids::{ById, grouped};
+use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::GAP_NS;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::inference::Stream;
@@ -72,6 +73,18 @@ pub(crate) fn believed(bags: &ById<usize, Calendar>) -> Belief {
     };
     belief.span = (!bags.iter().all(is_whole)).then_some(span);
     belief
+}
+
+/// What is said of the `aside` messages outside of the credible times of these bags.
+pub(crate) fn set_aside(bags: &ById<usize, Calendar>, span: Span, aside: u64) -> [Notice; 2] {
+    let zeros = bags.iter().map(|bag| bag.zeros).sum();
+    let zeros = if span.contains(Stamp(0)) { 0 } else { zeros };
+    let early = "message at time 0, before the clock was known, set aside";
+    let far = "message at an impossible time, set aside";
+    [
+        Notice::counted(NoticeKind::Note, zeros.min(aside), early),
+        Notice::counted(NoticeKind::ImpossibleTime, aside.saturating_sub(zeros), far),
+    ]
 }
 
 /// Whether the clock of a bag begins at 0: with a single message, or it goes on from there. Otherwise messages at exactly

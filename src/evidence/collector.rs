@@ -13,7 +13,7 @@ use crate::base::ids::ById;
 use crate::base::name::{in_space, is_log};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::{Span, Stamp};
-use crate::evidence::clock::{Belief, ClockOffset, believed, offsets};
+use crate::evidence::clock::{self, Belief, ClockOffset, believed, offsets};
 use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::message::cursor::PayloadCursor;
 use crate::evidence::message::dynamic::MessageSchema;
@@ -486,20 +486,9 @@ impl Recorded {
             return Ok(());
         };
         let before = self.firsts();
-        let zeros = self.messages.calendars().iter().map(|bag| bag.zeros);
-        let zeros = if span.contains(Stamp(0)) {
-            0
-        } else {
-            zeros.sum()
-        };
         let aside = self.clip(span)?;
-        let text = "message at time 0, before the clock was known, set aside";
-        self.notices
-            .add(Notice::counted(NoticeKind::Note, zeros, text));
-        let text = "message at an impossible time, set aside";
-        let far = aside.saturating_sub(zeros);
-        self.notices
-            .add(Notice::counted(NoticeKind::ImpossibleTime, far, text));
+        let aside = clock::set_aside(self.messages.calendars(), span, aside);
+        self.notices.extend(aside);
         let firsts = self.firsts();
         let kept = firsts.somes().min_by_key(|(_, first)| **first);
         let offset = |bag: &usize| {

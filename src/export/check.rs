@@ -47,10 +47,10 @@ pub(crate) fn check(targets: &[Target], kept: &[PathBuf]) -> Result<()> {
 }
 
 /// Checks a folder for tables named after the input, with this extension, before anything is created in it: no input in
-/// it may have a table's name.
+/// it may have a table's name, and all tables in it must be from an earlier run, which wrote an index of them.
 ///
 /// # Errors
-/// [`Error::Usage`] if a table might replace an input.
+/// [`Error::Usage`] if a table might replace an input or another file.
 pub(crate) fn check_folder(folder: &Path, ending: &str, kept: &[PathBuf]) -> Result<()> {
     let is_like_a_table = |path: &Path| {
         path.extension()
@@ -60,7 +60,17 @@ pub(crate) fn check_folder(folder: &Path, ending: &str, kept: &[PathBuf]) -> Res
     let clash = kept.iter().find(|path| {
         is_like_a_table(path) || path.canonicalize().is_ok_and(|path| is_like_a_table(&path))
     });
-    let Some(path) = clash else { return Ok(()) };
+    let Some(path) = clash else {
+        let beside = fs::read_dir(folder).into_iter().flatten().flatten();
+        let is_others = beside
+            .map(|entry| entry.path())
+            .any(|path| is_like_a_table(&path));
+        if !is_others || folder.join(format!("index.{ending}")).exists() {
+            return Ok(());
+        }
+        let what = format!("`{}` contains tables of another origin", folder.display());
+        return Err(Error::usage(what, "give a new folder"));
+    };
     let (folder, path) = (folder.display(), path.display());
     let what = format!("a table in `{folder}` might overwrite `{path}`, which is read");
     Err(Error::usage(what, "give another folder"))

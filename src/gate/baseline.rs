@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::expectation::SCHEMA;
 use super::facts::{Facts, Rate, Role, TopicIn};
-use super::values::Range;
+use super::values::{Pattern, Range};
 use crate::base::budget;
 use crate::base::ids::grouped;
 use crate::base::rhythm::{CLOSING_NS, FEWEST, FEWEST_OF_MEAN, GAP_NS};
@@ -108,7 +108,7 @@ impl Room {
     ) -> String {
         let mut out = String::new();
         for (name, line) in lines {
-            let name = scalar(name);
+            let name = scalar(&Pattern::text_of(name));
             let line = format!("  {name}: {line}\n");
             if name.len() > LONGEST || !self.takes(&line) {
                 self.left_out += 1;
@@ -360,6 +360,8 @@ fn topic(seen: &[TopicIn<'_>], times: &Times, is_optional: bool) -> Line {
         .filter(|_| hz.is_none());
     let mean_hz = mean(seen, hz).filter(|_| is_timed);
     let names = |names: BTreeSet<String>| (!names.is_empty()).then(|| list(names.iter()));
+    let nodes =
+        |nodes: BTreeSet<String>| names(nodes.iter().map(|name| Pattern::text_of(name)).collect());
     let types = common(seen, |s| Some(s.types())).unwrap_or_default();
     let types = match types.first() {
         Some(one) if types.len() == 1 => Some(scalar(one)),
@@ -377,8 +379,8 @@ fn topic(seen: &[TopicIn<'_>], times: &Times, is_optional: bool) -> Line {
     });
     let mut line = Line::of([
         ("type", types),
-        ("by", common(seen, TopicIn::by).and_then(names)),
-        ("to", names(to)),
+        ("by", common(seen, TopicIn::by).and_then(nodes)),
+        ("to", nodes(to)),
         ("hz", hz.map(|hz| hz.to_string())),
         ("mean_hz", mean_hz.map(|hz| hz.to_string())),
         ("max_gap", max_gap),

@@ -33,6 +33,10 @@ pub(crate) struct Facts<'a> {
     names: BTreeMap<&'a str, &'a str>,
     wiring: Wiring,
     rates: Rates<'a>,
+    /// The events of each node, but not those of its edges.
+    events: ById<NodeId, Vec<&'a Event>>,
+    /// Whether the bag lists all subscribers.
+    lists_all: bool,
 }
 
 /// A role of a mission and its nodes.
@@ -196,7 +200,19 @@ impl<'a> Facts<'a> {
                 names.insert(node.name.as_str(), &*node.role);
             }
         }
+        let mut events: ById<NodeId, Vec<&Event>> = ById::like(&elements.nodes, Vec::new());
+        for event in &mission.log.events {
+            if let Element::Node(id) = event.what {
+                events[id].push(event);
+            }
+        }
+        let lists_all = elements
+            .subscribes
+            .iter()
+            .any(|edge| has(edge.seen.evidence, &LISTING) && !elements.nodes[edge.node].is_tool());
         Self {
+            events,
+            lists_all,
             mission,
             confidences,
             messages: elements.topics.ids().map(count).collect(),
@@ -385,10 +401,15 @@ impl<'a> Facts<'a> {
     /// Whether the bag lists all subscribers, in general or for these nodes, so that an unlisted node is not a
     /// subscriber.
     pub(crate) fn lists_subscribers(&self, nodes: &[NodeId]) -> bool {
-        self.mission.elements.subscribes.iter().any(|edge| {
-            let own = nodes.contains(&edge.node) && has(edge.seen.evidence, &["links"]);
-            own || has(edge.seen.evidence, &LISTING) && !self.is_tool(&[edge.node])
-        })
+        let elements = &self.mission.elements;
+        let is_linked = |id: NodeId| {
+            let topics = self.wiring.subscribed[id].iter();
+            let edges = topics.filter_map(move |topic| elements.subscription(*topic, id));
+            edges
+                .into_iter()
+                .any(|edge| has(elements.subscribes[edge].seen.evidence, &["links"]))
+        };
+        self.lists_all || nodes.iter().any(|id| is_linked(*id))
     }
 
     /// The times in which any of these nodes is present; sorted, without overlaps.
@@ -421,9 +442,10 @@ impl<'a> Facts<'a> {
 
     /// Entries of the event log about any of these nodes, but not about their edges.
     pub(crate) fn events(&self, nodes: &[NodeId], kind: Kind) -> Vec<&'a Event> {
-        let own = |e: &&Event| matches!(e.what, Element::Node(id) if nodes.contains(&id));
-        let all = self.mission.log.events.iter().filter(own);
-        all.filter(|e| e.kind == kind).collect()
+        let all = nodes.iter().flat_map(|id| &self.events[*id]).copied();
+        let mut own: Vec<&Event> = all.filter(|e| e.kind == kind).collect();
+        own.sort_by_key(|e| e.time);
+        own
     }
 
     /// The last known lifecycle state of a role.
@@ -500,11 +522,15 @@ impl<'a> Facts<'a> {
 
     /// Whether any of these nodes sent a message on a topic other than housekeeping.
     pub(crate) fn is_sender(&self, nodes: &[NodeId]) -> bool {
-        let edges = self.mission.elements.publishes.with_ids();
-        let mut own = edges.filter(|(_, e)| nodes.contains(&e.node));
-        own.any(|(id, e)| {
-            messages(self.mission, Element::Publish(id)) > 0 && !self.is_housekeeping(e.topic)
-        })
+        let sends = |node: NodeId, topic: TopicId| {
+            let edge = self.mission.elements.publication(node, topic);
+            let many = edge.map_or(0, |edge| messages(self.mission, Element::Publish(edge)));
+            many > 0 && !self.is_housekeeping(topic)
+        };
+        let topics = |node| self.wiring.published[node].iter();
+        nodes
+            .iter()
+            .any(|node| topics(*node).any(|topic| sends(*node, *topic)))
     }
 
     /// The first and the last message of a topic, the latter 1 ns before the end; `None` if it has none.
@@ -580,8 +606,11 @@ impl<'a> Facts<'a> {
 
     /// The time of the last message of these nodes that is not housekeeping.
     pub(crate) fn last_sent(&self, nodes: &[NodeId]) -> Option<Stamp> {
-        let senders = self.mission.sending.senders.iter().filter(|sender| {
-            sender.node.is_some_and(|id| nodes.contains(&id)) && !self.is_housekeeping(sender.topic)
+        let sending = &self.mission.sending;
+        let senders = nodes.iter().flat_map(|id| {
+            let topics = self.wiring.published[*id].iter();
+            let topics = topics.filter(|topic| !self.is_housekeeping(**topic));
+            topics.filter_map(|topic| sending.of_edge(*id, *topic))
         });
         Some(Sending::bounds(senders)?.1)
     }

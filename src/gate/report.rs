@@ -138,7 +138,8 @@ fn cell(text: &str, escaped: fn(&str) -> String) -> String {
 impl Subject<'_> {
     /// The bags by their names, without folders.
     fn name(&self) -> String {
-        let names = self.mission.bags.iter().map(|bag| bag.name.clone());
+        let names = self.mission.bags.iter();
+        let names = names.map(|bag| words::visible(&bag.name).into_owned());
         let names: Vec<String> = names.collect();
         match &names[..] {
             [] => words::some_of(&self.bags, 2),

@@ -1,5 +1,5 @@
 //! The values of an expectations file: names with wildcards (`*` matches any characters except `/`, `**` any characters, `?` one
-//! that is not `/`), ranges of numbers (`13.5..16.5`, `5..`), times of a mission (`1:30..2m`, `-30s..`), measures of messages.
+//! that is not `/`; a backslash before them makes them plain), ranges of numbers (`13.5..16.5`, `5..`), times of a mission (`1:30..2m`, `-30s..`), measures of messages.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -29,8 +29,10 @@ impl Pattern {
     /// The pattern of this text.
     pub(crate) fn new(text: &str) -> Self {
         let mut parts = Vec::new();
-        for c in text.chars() {
+        let mut chars = text.chars();
+        while let Some(c) = chars.next() {
             match (c, parts.last()) {
+                ('\\', _) => parts.push(PatternPart::This(chars.next().unwrap_or(c))),
                 ('*', Some(PatternPart::Some | PatternPart::All)) => {
                     parts.pop();
                     parts.push(PatternPart::All);
@@ -40,13 +42,27 @@ impl Pattern {
                 (c, _) => parts.push(PatternPart::This(c)),
             }
         }
+        let name = parts.iter().map(|part| match part {
+            PatternPart::This(c) => Some(*c),
+            _ => None,
+        });
         Self {
-            text: text.to_owned(),
+            text: name.collect::<Option<String>>().unwrap_or(text.to_owned()),
             parts,
         }
     }
 
-    /// The pattern as written.
+    /// The text of the pattern that only matches this name.
+    pub(crate) fn text_of(name: &str) -> String {
+        let mut text = String::new();
+        for c in name.chars() {
+            text.extend(matches!(c, '*' | '?' | '\\').then_some('\\'));
+            text.push(c);
+        }
+        text
+    }
+
+    /// The pattern as written; for a name, the name.
     pub(crate) fn as_str(&self) -> &str {
         &self.text
     }

@@ -9,12 +9,14 @@ use std::path::PathBuf;
 
 use super::inputs::each_once;
 use super::read::files;
+use super::times::MessageTimes;
 use super::{Stage, Watch};
-use crate::bag::{self, Bounds, Input, OpenOptions, Reader, Report, known_span};
+use crate::bag::{self, Input, OpenOptions, Reader, Want, known_span};
 use crate::base::error::{Error, Result};
 use crate::base::name::TopicName;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::{Moment, Span};
+use crate::evidence::clock;
 use crate::export::check::{check, check_folder, make_folder};
 use crate::export::tables::TableFormat;
 use crate::export::target::Target;
@@ -98,15 +100,19 @@ impl Extract {
         inputs.map(|i| bag::open(i, &options)).collect()
     }
 
-    /// The requested part of the bags; `None` for all of it. Bags whose time range is not in their tails are read to
-    /// determine it.
-    fn range(&self, watch: &mut dyn Watch) -> Result<Option<Span>> {
-        if self.start.is_none() && self.end.is_none() {
+    /// The requested part of the bags; `None` for all of it. Bags whose time range is not in their tails, or not credible,
+    /// are read to determine it. Adds to `notices` what is said of messages at incredible times, if these were looked for.
+    fn range(&self, notices: &mut Notices, watch: &mut dyn Watch) -> Result<Option<Span>> {
+        let is_whole = self.start.is_none() && self.end.is_none();
+        // A row per message is only written once all times are known.
+        if is_whole && (!self.fields || self.inputs.iter().any(Input::is_pipe)) {
             return Ok(None);
         }
-        let span = match known_span(&mut self.open_files()?)? {
+        let known = known_span(&mut self.open_files()?)?;
+        let span = match known.filter(|span| clock::is_sure(*span)) {
+            Some(_) if is_whole => return Ok(None),
             Some(span) => Some(span),
-            None => self.measure(watch)?,
+            None => self.measure(notices, watch)?,
         };
         let division = Division {
             start: self.start,
@@ -127,13 +133,15 @@ impl Extract {
         self.open()
     }
 
-    fn measure(&self, watch: &mut dyn Watch) -> Result<Option<Span>> {
-        let mut bounds = Bounds::default();
+    fn measure(&self, notices: &mut Notices, watch: &mut dyn Watch) -> Result<Option<Span>> {
+        let all = NameFilter::default();
+        let mut times = MessageTimes::new(&all, Want::Stamps);
         for mut reader in self.open()? {
-            reader.read(None, &mut bounds)?;
+            times.read(&mut *reader, None, watch)?;
             stop(watch)?;
         }
-        Ok(bounds.0)
+        notices.extend(times.finish()?);
+        Ok(times.span())
     }
 }
 
@@ -143,11 +151,4 @@ fn stop(watch: &dyn Watch) -> Result<()> {
         return Err(Error::Interrupted);
     }
     Ok(())
-}
-
-/// The notice about losses of a bag that reported none.
-pub(super) fn of_report(report: &Report, notices: &Notices) -> Option<Notice> {
-    use crate::base::notice::NoticeKind::Damaged;
-    let silent = !report.complete && !notices.any_loss();
-    silent.then(|| Notice::new(Damaged, format!("`{}` is not complete", report.name)))
 }

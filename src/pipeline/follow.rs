@@ -7,14 +7,16 @@ mod feed;
 
 use std::path::Path;
 
-use super::Reading;
 use super::collect::Collected;
-use super::read::so_far;
+use super::read::{read, so_far};
+use super::{Reading, Unwatched};
 pub use crate::bag::Growth;
 use crate::bag::{self, Growing, Input, Report, Tier, file_name};
 use crate::base::cast;
 use crate::base::error::{Error, Result};
+use crate::base::notice::{Notice, Notices};
 use crate::base::time::{Period, Span, Stamp};
+use crate::evidence::clock::is_sure;
 use crate::evidence::collector::Collector;
 use crate::graph::window::Length;
 use crate::mission::Mission;
@@ -82,7 +84,10 @@ impl Follow {
     /// If the recording no longer exists, or a temporary file cannot be used.
     pub fn poll(&mut self) -> Result<Growth> {
         let growth = self.growing.poll(&mut self.collector.on(&mut |_, _| {}))?;
-        if let Some((first, last, _)) = self.collector.extent().filter(|_| growth == Growth::More) {
+        // A message at an impossible time makes no others old.
+        let is_sure = |(first, last, _): &(Stamp, Stamp, u64)| is_sure(Span::new(*first, *last));
+        let extent = self.collector.extent().filter(is_sure);
+        if let Some((first, last, _)) = extent.filter(|_| growth == Growth::More) {
             self.origin.get_or_insert(first);
             let keep = self.keep.nanos();
             let begins = self.forgotten.unwrap_or(first);
@@ -93,6 +98,23 @@ impl Follow {
             }
         }
         Ok(growth)
+    }
+
+    /// What was lost of the recording so far and, with `is_over`, what reading the closed one reports besides.
+    ///
+    /// # Errors
+    /// If it cannot be read, or a temporary file cannot be used.
+    pub(crate) fn losses(&self, is_over: bool) -> Result<Notices> {
+        let from = self.forgotten.unwrap_or(Stamp::MIN);
+        let known = self.collector.so_far(from)?.notices;
+        let closed = is_over.then(|| read(&self.closed(), &mut Unwatched));
+        let closed = closed.transpose()?.map(|mission| mission.notices);
+        let is_new = |new: &Notice| known.iter().all(|known| known.text != new.text);
+        let new = closed.iter().flat_map(Notices::iter).filter(is_new);
+        let mut losses = Notices::new();
+        let all = known.iter().chain(new);
+        losses.extend(all.filter(|notice| notice.kind.is_loss()));
+        Ok(losses)
     }
 
     /// The path of the recording.

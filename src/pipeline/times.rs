@@ -5,12 +5,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::Watch;
-use super::extract::of_report;
 use crate::bag::{Connection, ConnectionId, Reader, Report, Sink, Want};
 use crate::base::error::{Error, Result};
 use crate::base::name::{NodeName, TopicName};
-use crate::base::notice::{Notice, Notices};
+use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::{Span, Stamp};
+use crate::evidence::clock;
 use crate::evidence::times::{SeriesId, Stamps, Timed};
 use crate::view::NameFilter;
 
@@ -35,6 +35,8 @@ pub(super) struct MessageTimes<'a> {
     pub(super) notices: Notices,
     /// All topics of the bags.
     pub(super) topics: BTreeSet<TopicName>,
+    /// The number of bags read.
+    bags: usize,
 }
 
 impl<'a> MessageTimes<'a> {
@@ -47,6 +49,7 @@ impl<'a> MessageTimes<'a> {
             senders: Vec::new(),
             notices: Notices::default(),
             topics: BTreeSet::new(),
+            bags: 0,
         }
     }
 
@@ -63,13 +66,27 @@ impl<'a> MessageTimes<'a> {
             watch,
         };
         let report = reader.read(range, &mut one)?;
+        self.bags += 1;
         self.notices.extend(of_report(&report, &self.notices));
         Ok(report)
     }
 
-    /// After the last bag.
-    pub(super) fn finish(&mut self) -> Result<()> {
-        self.stamps.finish().map_err(spool)
+    /// Sets the messages at incredible times aside, after the last bag; returns what is said of them.
+    pub(super) fn finish(&mut self) -> Result<Vec<Notice>> {
+        self.stamps.finish().map_err(spool)?;
+        let Some(span) = clock::believed(self.stamps.calendars()).span else {
+            return Ok(Vec::new());
+        };
+        let clips = self.series.iter().map(|id| self.stamps.clip(*id, span));
+        let aside = clips.sum::<std::io::Result<u64>>().map_err(spool)?;
+        Ok(clock::set_aside(self.stamps.calendars(), span, aside).into())
+    }
+
+    /// The time that the messages cover.
+    pub(super) fn span(&self) -> Option<Span> {
+        let bounds = self.series.iter().filter_map(|id| self.stamps.bounds(*id));
+        let spans = bounds.map(|(first, last)| Span::new(first, last.plus(1)));
+        spans.reduce(|all, span| all.hull(span))
     }
 
     /// Passes on the messages of these series sorted by time, then by series.
@@ -96,7 +113,7 @@ impl Sink for OfBag<'_, '_> {
         let is_wanted = all.filter.passes(connection.topic.as_str());
         all.topics.insert(connection.topic.clone());
         self.series.push(is_wanted.then(|| {
-            let series = [all.stamps.series(), all.stamps.series()];
+            let series = [(); 2].map(|()| all.stamps.series_of(all.bags));
             all.series.extend(series);
             all.senders.extend(series.map(|_| Sender {
                 topic: connection.topic.clone(),
@@ -123,4 +140,15 @@ impl Sink for OfBag<'_, '_> {
     fn progress(&mut self, done: u64, total: u64) {
         self.watch.progress(done, total);
     }
+}
+
+/// The notice about losses of a bag that reported none.
+pub(super) fn of_report(report: &Report, notices: &Notices) -> Option<Notice> {
+    let silent = !report.complete && !notices.any_loss();
+    silent.then(|| {
+        Notice::new(
+            NoticeKind::Damaged,
+            format!("`{}` is not complete", report.name),
+        )
+    })
 }

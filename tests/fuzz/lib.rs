@@ -104,24 +104,83 @@ fn count(bytes: &[u8], verify: bool) -> Option<(u64, bool)> {
     counted
 }
 
-/// Damages or cuts a healthy file of any format as encoded in the bytes (a position and a mask in every three): losses
-/// must be reported, by both readings.
+/// The healthy bags that targets damage.
+static BAGS: LazyLock<Vec<(&str, Vec<u8>)>> = LazyLock::new(tiny::bags);
+
+/// A healthy file of any format, damaged as encoded in the bytes: up to four edits of five bytes, each a kind, a place and
+/// another place or number. Bits change, zeros are written, records and chunks are exchanged or doubled, the end is cut.
+/// Returns its name and whether it was cut.
+fn damaged(bytes: &[u8]) -> Option<(&'static str, Vec<u8>, bool)> {
+    let (way, edits) = bytes.split_first()?;
+    let (name, healthy) = &BAGS[usize::from(*way) % BAGS.len()];
+    let (mut file, mut is_cut) = (healthy.clone(), false);
+    for edit in edits.chunks_exact(5).take(4) {
+        let number = |at: usize| usize::from(u16::from_le_bytes([edit[at], edit[at + 1]]));
+        let len = file.len();
+        let (at, other) = (number(1) % len, number(3) % len);
+        let (low, high) = (at.min(other), at.max(other));
+        match edit[0] % 6 {
+            0 | 1 => file[at] ^= edit[3],
+            2 => file[at..len.min(at + (8 << (edit[3] % 7)))].fill(0),
+            3 => {
+                let part = (high - low).min(len - high).min(600);
+                for byte in 0..part {
+                    file.swap(low + byte, high + byte);
+                }
+            }
+            4 => {
+                let part = file[low..high.min(low + 600)].to_vec();
+                file.splice(high..high, part);
+            }
+            _ => {
+                file.truncate(at.max(1));
+                is_cut = true;
+            }
+        }
+    }
+    Some((name, file, is_cut))
+}
+
+/// Damages a healthy file: losses must be reported, by both readings. The killed recorder of a ROS 1 bag
+/// may have stopped between two records.
 pub fn damage(bytes: &[u8]) {
-    static BAGS: LazyLock<Vec<(&str, Vec<u8>)>> = LazyLock::new(tiny::bags);
-    let Some(([way, cut], edits)) = bytes.split_first_chunk() else {
+    let Some((name, file, is_cut)) = damaged(bytes) else {
         return;
     };
-    let (name, healthy) = &BAGS[usize::from(*way) % BAGS.len()];
-    let mut file = healthy.clone();
-    for edit in edits.chunks_exact(3).take(4) {
-        let at = usize::from(u16::from_le_bytes([edit[0], edit[1]])) % file.len();
-        file[at] ^= edit[2];
+    let is_open = is_cut && name.starts_with("front") && name.ends_with(".bag");
+    for verify in [false, true] {
+        if let Some((found, is_said)) = count(&file, verify) {
+            let is_whole = found >= tiny::MESSAGES as u64;
+            assert!(is_whole || is_said || is_open, "{name}: {found} messages without a notice");
+        }
     }
-    if *way & 128 != 0 {
-        file.truncate(file.len() * usize::from(*cut) / 256);
+}
+
+/// Damages a healthy file and compresses it as a whole: losses must be reported.
+pub fn damage_packed(bytes: &[u8]) {
+    let Some((name, file, is_cut)) = damaged(bytes) else {
+        return;
+    };
+    let packed = zstd::encode_all(&file[..], 1).expect("a frame");
+    let is_open = is_cut && name.starts_with("front") && name.ends_with(".bag");
+    if let Some((found, is_said)) = count(&packed, false) {
+        let is_whole = found >= tiny::MESSAGES as u64;
+        assert!(is_whole || is_said || is_open, "{name}: {found} messages without a notice");
     }
-    if let Some((found, is_said)) = count(&file, *way & 64 != 0) {
-        assert!(found >= tiny::MESSAGES as u64 || is_said, "{name}: {found} messages without a notice");
+}
+
+/// Damages two or three healthy files and reads them into one mission.
+pub fn several(bytes: &[u8]) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let parts = bytes.chunks(bytes.len().div_ceil(3).max(6)).filter_map(damaged);
+    let paths = parts.enumerate().map(|(at, (name, file, _))| {
+        let path = folder.path().join(format!("{at}_{name}"));
+        std::fs::write(&path, file).expect("a file");
+        path
+    });
+    let paths: Vec<_> = paths.collect();
+    if let Ok(mission) = read(&Reading::of(paths), &mut Unwatched) {
+        assert!(!mission.windows.is_empty());
     }
 }
 

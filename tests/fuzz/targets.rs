@@ -7,7 +7,9 @@ use std::sync::LazyLock;
 use bagreel::internals::draw::style::Style;
 use bagreel::internals::evidence::topology;
 use bagreel::internals::mission::read_json;
-use bagreel_fuzz::{as_file, damage, outputs, read_bag, read_graphs, read_message};
+use bagreel_fuzz::{
+    as_file, damage, damage_packed, outputs, read_bag, read_graphs, read_message, several,
+};
 use libfuzzer_sys::fuzz_target;
 
 type Target = fn(&[u8]);
@@ -31,6 +33,8 @@ const TARGETS: &[(&str, Target)] = &[
     ("mission", |bytes| as_text(bytes, |text| drop(read_json(text, "x.json".as_ref())))),
     ("graph", |bytes| as_file("x", bytes, read_graphs)),
     ("damage", damage),
+    ("damage_packed", damage_packed),
+    ("several", several),
     ("outputs", outputs),
 ];
 

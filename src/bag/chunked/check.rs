@@ -8,7 +8,7 @@ use crate::base::time::Stamp;
 pub(super) struct Behind {
     pub(super) id: ConnectionId,
     pub(super) count: u32,
-    /// The times of the messages, if requested.
+    /// The times of the messages; none if there are too many.
     pub(super) stamps: Vec<Stamp>,
 }
 
@@ -25,6 +25,8 @@ pub(super) struct ChunkMessages {
     interrupted: bool,
     /// Index records that contradict the chunk.
     behind: Vec<Behind>,
+    /// Whether one has the same messages at other times.
+    misdated: bool,
     /// The number of messages in the index but not in the chunk; `surplus` is the converse.
     missing: u64,
     surplus: u64,
@@ -50,11 +52,11 @@ impl ChunkMessages {
         self.interrupted = true;
     }
 
-    /// Whether the times of an index record of `count` messages are worth reading.
-    pub(super) fn wants_stamps(&self, id: ConnectionId, count: u32) -> bool {
-        let found = self.gather.count(id);
-        let differs = self.doubtful && found != u64::from(count);
-        self.interrupted || differs || found < u64::from(count)
+    /// Passes on what was found so far, unless the index may be needed instead.
+    pub(super) fn spill(&mut self, sink: &mut dyn Sink) {
+        if !self.doubtful {
+            self.gather.spill(sink);
+        }
     }
 
     /// Whether an index record belongs to a chunk that was not seen, not to the last one.
@@ -67,9 +69,18 @@ impl ChunkMessages {
         let (found, count) = (self.gather.count(record.id), u64::from(record.count));
         self.missing += count.saturating_sub(found);
         self.surplus += found.saturating_sub(count);
-        if !record.stamps.is_empty() || count == 0 {
+        let is_whole = record.stamps.len() as u64 == count;
+        let is_needed = self.interrupted || self.doubtful && found != count || found < count;
+        if !is_needed && is_whole && found == count {
+            self.misdated |= !self.gather.holds(record.id, &record.stamps);
+        } else if is_needed && is_whole {
             self.behind.push(record);
         }
+    }
+
+    /// Whether the index states other times than the messages of the chunk have.
+    pub(super) fn is_misdated(&mut self) -> bool {
+        std::mem::take(&mut self.misdated)
     }
 
     /// Reports all messages to `sink`; returns how many were only in the index, and how many only in the chunk. If the

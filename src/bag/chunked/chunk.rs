@@ -4,14 +4,13 @@ use std::io;
 
 use super::Grammar;
 use super::forward::next_chunk;
-use super::index::{ChunkBody, Index, IndexSum, LONGEST_INDEX, Query, hand_over, nameless};
+use super::index::{ChunkBody, Index, IndexSum, LONGEST_INDEX, Query, hand_over, nameless, spans};
 use super::plan::Chunk;
 use super::record::{NoRecord, RecordHead};
 use super::unpack::{Visitor, unpack};
 use crate::bag::adapters::Gather;
-use crate::bag::model::{Sink, Want, lost};
+use crate::bag::model::{Sink, Want, damaged, lost};
 use crate::bag::source::{ByteStream, FAR, GLANCE};
-use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
 
 impl<G: Grammar> Query<'_, G> {
@@ -25,21 +24,22 @@ impl<G: Grammar> Query<'_, G> {
             Ok(found) => found,
             Err(e) => return lost(sink, "a chunk's index cannot be read", &e),
         };
+        let times = (chunk.first, chunk.last);
+        let found = found.filter(|found| found.index.times().is_none_or(|own| spans(own, times)));
         let Some(found) = found else {
-            let text = "chunks were read whole, since their index is missing or wrong";
-            sink.notice(Notice::new(NoticeKind::Damaged, text));
+            damaged(
+                sink,
+                1,
+                "chunks were read whole, since their index is missing or wrong",
+            );
             let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, FAR);
             self.walked(&mut stream, Share::Whole, sink);
             return self.unnamed(chunk, sink);
         };
         let body = found.body.or_else(|| self.moved(chunk));
         self.report(&found.index, body, sink);
-        let wrong = [
-            (!found.index.spans(chunk.first, chunk.last)).then_some(OTHER_TIMES),
-            (found.place == Place::Apart).then_some(APART),
-        ];
-        for text in wrong.into_iter().flatten() {
-            sink.notice(Notice::new(NoticeKind::Damaged, text));
+        if found.place == Place::Apart {
+            damaged(sink, 1, APART);
         }
         if found.place != Place::Expected {
             self.unnamed(chunk, sink);
@@ -54,8 +54,7 @@ impl<G: Grammar> Query<'_, G> {
         let mut stream = ByteStream::of_file(self.source, body.range.end, self.tail, FAR);
         let mut from = chunk.start;
         while next_chunk::<G>(&mut stream, from) && stream.position() < chunk.end {
-            let text = "chunks that the index does not list were read";
-            sink.notice(Notice::new(NoticeKind::Damaged, text));
+            damaged(sink, 1, "chunks that the index does not list were read");
             from = stream.position();
             let here = Chunk {
                 start: from,
@@ -142,8 +141,7 @@ impl<G: Grammar> Query<'_, G> {
     /// Reports the chunk at the position of `stream` to `sink`, record by record, and damage in it.
     fn walked(&self, stream: &mut ByteStream<'_>, what: Share, sink: &mut dyn Sink) {
         if let Err(why) = self.walk(stream, what, sink) {
-            let text = format!("a chunk is damaged inside: {why}");
-            sink.notice(Notice::new(NoticeKind::Damaged, text));
+            damaged(sink, 1, &format!("a chunk is damaged inside: {why}"));
         }
     }
 
@@ -172,7 +170,6 @@ impl<G: Grammar> Query<'_, G> {
     }
 }
 
-const OTHER_TIMES: &str = "chunks begin or end at other times than the bag's index states";
 const APART: &str = "chunks differ in position or length from the bag's index";
 
 /// The index of a chunk.

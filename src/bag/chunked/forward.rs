@@ -1,15 +1,18 @@
 //! A chunked bag record by record from the front: without an index, cut, still open, or from a pipe.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io;
+use std::marker::PhantomData;
 use std::sync::Arc;
 
 use super::Grammar;
 use super::check::{Behind, ChunkMessages};
-use super::index::{hand_over, nameless};
-use super::record::{Announced, ChunkHead, NoRecord, RecordHead, pass, peek_whole, walk};
+use super::index::{OTHER_TIMES, absent, hand_over, nameless, spans};
+use super::plan::MOST_CHUNKS;
+use super::record::{Announced, ChunkHead, Counts, NoRecord, RecordHead, pass, peek_whole, walk};
 use super::unpack::{Visitor, records, unpack};
 use crate::bag::decompress::{Allowance, Compression};
-use crate::bag::model::Sink;
+use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Sink, damaged};
 use crate::bag::source::ByteStream;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
@@ -17,116 +20,247 @@ use crate::base::time::Stamp;
 /// The number of bytes searched at a time for the next record.
 const STRIDE: usize = 64 * 1024;
 
-/// The result of reading from the front.
-#[derive(Debug, Default)]
-pub(super) struct ForwardScan {
-    pub(super) compression: BTreeSet<Compression>,
-    /// Whether the bag is not cut and nothing was skipped.
-    pub(super) complete: bool,
-}
-
-/// Messages that came before the description of their connection.
+/// The messages of connections that are not described, or not yet.
 #[derive(Default)]
 struct Early {
-    runs: BTreeMap<u32, (Vec<Stamp>, Vec<u32>)>,
+    runs: BTreeMap<u32, EarlyRun>,
     held: usize,
-    dropped: u64,
+    /// The connections of those of the last chunk.
+    last: Vec<u32>,
+}
+
+/// The messages of one of them. Those that only the index of their chunk has come without sizes.
+#[derive(Default)]
+struct EarlyRun {
+    stamps: Vec<Stamp>,
+    sizes: Vec<u32>,
 }
 
 /// The most early messages that are kept: 3 MB.
 const MOST_EARLY: usize = 1 << 18;
 
-/// A walk through the records of a bag.
-struct Forward<'s, G> {
-    sink: &'s mut dyn Sink,
+/// What a bag states about itself, beside what was found in it.
+#[derive(Default)]
+struct Account {
+    stated: Counts,
+    /// The chunks found by their positions, with the first and the last time in those that were read whole.
+    chunks: BTreeMap<u64, Option<(Stamp, Stamp)>>,
+    /// The chunks that the index lists, and whether one of them was found at other times than listed.
+    listed: BTreeSet<u64>,
+    is_misdated: bool,
+}
+
+impl Account {
+    /// Takes a chunk that was found.
+    fn find(&mut self, at: u64, times: Option<(Stamp, Stamp)>) {
+        if self.chunks.len() < MOST_CHUNKS {
+            self.chunks.insert(at, times);
+        }
+    }
+
+    /// Takes a chunk that the index lists.
+    fn list(&mut self, at: u64, listed: (Stamp, Stamp)) {
+        if self.listed.len() < MOST_CHUNKS {
+            self.listed.insert(at);
+        }
+        let times = self.chunks.get(&at).copied().flatten();
+        self.is_misdated |= times.is_some_and(|times| !spans(times, listed));
+    }
+
+    /// Says what a walk left unread, which found `messages` messages. What nothing states is not missed; everything that
+    /// the head, the summary or the index states is compared here and nowhere else.
+    fn unread(&self, messages: u64, mut say: impl FnMut(&str)) {
+        let stated = self.stated;
+        let chunks = self.chunks.len() as u64;
+        let pairs = [
+            (stated.messages, messages, "messages"),
+            (stated.chunks.into(), chunks, "chunks"),
+        ];
+        for (stated, found, what) in pairs {
+            if stated > found && chunks < MOST_CHUNKS as u64 {
+                say(&format!(
+                    "the bag should contain {stated} {what}; found {found}"
+                ));
+            }
+        }
+        if !self.listed.is_empty() && !self.listed.iter().eq(self.chunks.keys()) {
+            say("its index lists other chunks than were found");
+        }
+        if self.is_misdated {
+            say(OTHER_TIMES);
+        }
+    }
+}
+
+/// A walk through the records of a bag: of all of it at once, or in steps while it grows.
+#[derive(Default)]
+pub(super) struct Walk<G> {
     announced: Announced<G>,
     found_messages: ChunkMessages,
     early: Early,
-    found: ForwardScan,
+    compression: BTreeSet<Compression>,
     allowance: Arc<Allowance>,
-    /// The number of messages that the bag states.
-    total: Option<u64>,
-    /// Whether the end of the data was reached.
+    account: Account,
+    /// Whether the end of the data was reached, and the record that ends the file.
     ended: bool,
+    closed: bool,
+    /// The position after the head of the last chunk, which its recorder may write again.
+    pub(super) body: u64,
     /// Whether messages are stored in chunks: a closed chunk was found.
     is_chunked: bool,
+    /// The first and the last time in the chunk that is read.
+    times: Option<(Stamp, Stamp)>,
 }
 
-/// Reads all of `stream` from the first record on; `size` is the length of the bag, 0 if unknown.
+/// Its next steps, with the receiver of what they find.
+struct Forward<'a, G> {
+    walk: &'a mut Walk<G>,
+    sink: &'a mut dyn Sink,
+}
+
+/// Reads all of `stream` from the first record on; `size` is the length of the bag, 0 if unknown. Returns the compressions of
+/// its chunks; every loss is a notice.
 pub(super) fn read<G: Grammar>(
     stream: &mut ByteStream<'_>,
     size: u64,
     sink: &mut dyn Sink,
-) -> ForwardScan {
-    let mut forward: Forward<'_, G> = Forward {
-        sink,
-        announced: Announced::default(),
-        found_messages: ChunkMessages::default(),
-        early: Early::default(),
-        found: ForwardScan {
-            complete: true,
-            ..ForwardScan::default()
-        },
-        allowance: Arc::default(),
-        total: None,
-        ended: false,
-        is_chunked: false,
-    };
-    let mut at = stream.position();
-    let stop = walk(stream, u64::MAX, |stream| {
-        let from = stream.position();
-        let step = G::next(stream).and_then(|record| forward.record(stream, record));
-        at = stream.position();
-        match step {
-            Err(NoRecord::Broken | NoRecord::Cut) if forward.resume(stream, from) => {}
-            step => step?,
+) -> BTreeSet<Compression> {
+    let mut walk = Walk::<G>::default();
+    let (stop, at) = walk.go(stream, size, false, sink);
+    walk.finish(stop, at, sink)
+}
+
+impl<G: Grammar> Walk<G> {
+    /// Takes the records of `stream`; returns why they end and the position after the last one that was taken. If the bag
+    /// `is_growing`, a record that is not complete is left for later, unless a chunk follows it.
+    pub(super) fn go(
+        &mut self,
+        stream: &mut ByteStream<'_>,
+        size: u64,
+        is_growing: bool,
+        sink: &mut dyn Sink,
+    ) -> (NoRecord, u64) {
+        let mut forward = Forward { walk: self, sink };
+        let mut at = stream.position();
+        let stop = walk(stream, u64::MAX, |stream| {
+            let from = stream.position();
+            let step = G::next(stream).and_then(|record| match record {
+                RecordHead::Chunk(head) if is_growing && head.unclosed => {
+                    let body = stream.position();
+                    let is_followed = next_chunk::<G>(stream, from);
+                    stream.back(body);
+                    let chunk = is_followed.then(|| forward.chunk(stream, from, &head));
+                    chunk.unwrap_or(Err(NoRecord::Cut))
+                }
+                record if is_growing && stream.left().is_some_and(|left| left < record.len()) => {
+                    Err(NoRecord::Cut)
+                }
+                record => forward.record(stream, from, record),
+            });
+            at = if is_growing { at } else { stream.position() };
+            match step {
+                Err(NoRecord::Broken | NoRecord::Cut) if forward.resume(stream, from) => {}
+                step => step?,
+            }
+            at = stream.position();
+            forward.sink.progress(at, size);
+            Ok(())
+        });
+        if is_growing {
+            self.found_messages.spill(sink);
         }
-        forward.sink.progress(at, size);
-        Ok(())
-    });
-    forward.finish(stop, at)
+        (stop, at)
+    }
+
+    /// Reports what the walk left unread, once it stopped at byte `at`.
+    pub(super) fn finish(
+        mut self,
+        stop: NoRecord,
+        at: u64,
+        sink: &mut dyn Sink,
+    ) -> BTreeSet<Compression> {
+        let mut forward = Forward {
+            walk: &mut self,
+            sink,
+        };
+        forward.report_chunk();
+        forward.name_early();
+        let found = forward.walk.found_messages.messages;
+        let account = std::mem::take(&mut forward.walk.account);
+        account.unread(found, |text| forward.damage(text));
+        let walk = forward.walk;
+        let is_cut = !matches!(stop, NoRecord::Io(_));
+        let text = match &stop {
+            NoRecord::End if !G::HAS_END => return self.compression,
+            _ if walk.closed && is_cut => return self.compression,
+            _ if walk.ended && is_cut => {
+                format!("the bag is cut at byte {at}, behind its messages")
+            }
+            NoRecord::End => format!("the bag was never finished; it ends at byte {at}"),
+            NoRecord::Cut => format!("the bag is cut at byte {at}"),
+            NoRecord::Broken => format!("no record at byte {at}"),
+            NoRecord::Io(e) => format!("reading stopped at byte {at}: {e}"),
+        };
+        let is_broken = !is_cut || matches!(stop, NoRecord::Broken) && !walk.ended;
+        let kind = if is_broken {
+            NoticeKind::Damaged
+        } else {
+            NoticeKind::Truncated
+        };
+        forward.sink.notice(Notice::new(kind, text));
+        self.compression
+    }
 }
 
 impl<G: Grammar> Forward<'_, G> {
     fn record(
         &mut self,
         stream: &mut ByteStream<'_>,
+        from: u64,
         record: RecordHead<G::Description>,
     ) -> Result<(), NoRecord> {
-        if self.ended && matches!(record, RecordHead::Chunk(_) | RecordHead::Message { .. }) {
-            self.ended = false;
+        let is_content = matches!(record, RecordHead::Chunk(_) | RecordHead::Message { .. });
+        if self.walk.ended && is_content {
+            self.walk.ended = false;
             self.damage("messages follow the end of the data");
         }
-        if let RecordHead::Tail { .. } | RecordHead::Total { .. } = record
-            && !self.ended
-        {
+        if record.is_of_the_end() && G::HAS_END && !self.walk.ended {
             self.damage("records that belong to the bag's end are among its messages");
         }
         match record {
-            RecordHead::Chunk(head) => self.chunk(stream, &head),
+            RecordHead::Chunk(head) => self.chunk(stream, from, &head),
             RecordHead::Message { raw, time, size } => {
-                if self.is_chunked && !G::IS_LOOSE {
+                if self.walk.is_chunked && !G::IS_LOOSE {
                     self.damage("messages are outside of chunks");
                 }
-                self.found.compression.insert(Compression::None);
+                self.walk.compression.insert(Compression::None);
                 self.message(stream, (raw, time, size))
             }
             RecordHead::Description { what, len } => self.description(stream, &what, len),
             RecordHead::Index { raw, count, len } => self.index(stream, (raw, count), len),
-            RecordHead::Total { messages, len } => {
-                self.total = Some(messages);
+            RecordHead::Total { stated, len } => {
+                self.walk.account.stated = stated;
+                pass(stream, len)
+            }
+            RecordHead::Listed { at, times, len } => {
+                self.report_chunk();
+                self.walk.account.list(at, times);
                 pass(stream, len)
             }
             RecordHead::DataEnd { len, crc } => {
-                self.ended = true;
-                if crc.is_some_and(|crc| stream.sum().is_some_and(|sum| sum != crc)) {
+                self.walk.ended = true;
+                if is_other(stream, crc) {
                     self.damage("the checksum of its data is wrong");
                 }
-                pass(stream, len)
+                pass(stream, len)?;
+                if stream.sum().is_some() {
+                    stream.sum_up();
+                }
+                Ok(())
             }
-            RecordHead::FileEnd { len } => self.file_end(stream, len),
+            RecordHead::FileEnd { len, crc } => self.file_end(stream, len, crc),
             RecordHead::Unknown { len, extension } => {
-                self.found_messages.interrupt();
+                self.walk.found_messages.interrupt();
                 let text = "records of a kind that the format does not define were skipped";
                 if extension {
                     self.sink.notice(Notice::new(NoticeKind::Note, text));
@@ -136,17 +270,27 @@ impl<G: Grammar> Forward<'_, G> {
                 pass(stream, len)
             }
             RecordHead::Other { len } | RecordHead::Tail { len } => {
-                self.found_messages.interrupt();
+                self.walk.found_messages.interrupt();
                 pass(stream, len)
             }
         }
     }
 
     /// Ends the walk if the bag ends here properly.
-    fn file_end(&mut self, stream: &mut ByteStream<'_>, len: u64) -> Result<(), NoRecord> {
-        self.ended = true;
-        pass(stream, len)?;
+    fn file_end(
+        &mut self,
+        stream: &mut ByteStream<'_>,
+        len: u64,
+        crc: Option<u32>,
+    ) -> Result<(), NoRecord> {
+        (self.walk.ended, self.walk.closed) = (true, true);
+        pass(stream, len.saturating_sub(4))?;
+        if is_other(stream, crc) {
+            self.damage("the checksum of its summary is wrong");
+        }
+        pass(stream, len.min(4))?;
         if stream.peek(G::CLOSING.len() + 1)? == G::CLOSING {
+            stream.advance(G::CLOSING.len());
             return Err(NoRecord::End);
         }
         let at = stream.position();
@@ -168,35 +312,52 @@ impl<G: Grammar> Forward<'_, G> {
         found
     }
 
-    fn chunk(&mut self, stream: &mut ByteStream<'_>, head: &ChunkHead) -> Result<(), NoRecord> {
+    /// Reads a chunk whose record began at byte `from`.
+    fn chunk(
+        &mut self,
+        stream: &mut ByteStream<'_>,
+        from: u64,
+        head: &ChunkHead,
+    ) -> Result<(), NoRecord> {
         self.report_chunk();
-        self.is_chunked = head.packed > 0;
-        self.found.compression.extend(head.how);
+        self.walk.body = stream.position();
+        self.walk.is_chunked = head.packed > 0;
+        self.walk.compression.extend(head.how);
         if head.misnamed {
             self.damage("a chunk is marked as another kind of record; it was read anyway");
         }
         if head.unclosed {
-            return Err(self.tail(stream, head.how.unwrap_or(Compression::None)));
+            self.walk.account.find(from, None);
+            return self.unclosed(stream, head.how.unwrap_or(Compression::None));
         }
-        let allowance = Arc::clone(&self.allowance);
+        let allowance = Arc::clone(&self.walk.allowance);
+        self.walk.times = None;
         let wrong = unpack(stream, head, &allowance, self)?;
+        let times = self.walk.times.filter(|_| wrong.is_none());
+        self.walk.account.find(from, times);
         if let Some(why) = wrong {
-            self.found_messages.doubt(head.times);
+            self.walk.found_messages.doubt(head.times);
             self.damage(&format!("a chunk is damaged inside: {why}"));
         }
         Ok(())
     }
 
-    /// Reads the rest of the file as one compressed chunk that was never closed.
-    fn tail(&mut self, stream: &mut ByteStream<'_>, how: Compression) -> NoRecord {
-        let mut plain = match self.allowance.open(how, &mut *stream) {
-            Ok(reader) => ByteStream::of_reader(reader),
-            Err(e) => return NoRecord::Io(e),
+    /// Reads a compressed chunk without a length: the last one, which was never closed, unless another follows.
+    fn unclosed(&mut self, stream: &mut ByteStream<'_>, how: Compression) -> Result<(), NoRecord> {
+        let mut body = BeforeChunk::<G>::new(stream);
+        let read = match self.walk.allowance.open(how, &mut body) {
+            Ok(reader) => records(&mut ByteStream::of_reader(reader), u64::MAX, self),
+            Err(e) => Err(NoRecord::Io(e)),
         };
-        match records(&mut plain, u64::MAX, self) {
-            Ok(()) => NoRecord::End,
-            Err(NoRecord::Broken) => NoRecord::Cut,
-            Err(stop) => stop,
+        let behind = io::copy(&mut body, &mut io::sink())?;
+        let is_followed = body.is_at_chunk;
+        if behind > 0 || is_followed {
+            self.damage("a chunk has no length, and more follows it");
+        }
+        match read {
+            Err(_) if is_followed => Ok(()),
+            Err(NoRecord::Broken) => Err(NoRecord::Cut),
+            read => read,
         }
     }
 
@@ -207,78 +368,60 @@ impl<G: Grammar> Forward<'_, G> {
         (raw, count): (u32, u32),
         len: u64,
     ) -> Result<(), NoRecord> {
-        let Some((id, _)) = self.announced.get(raw) else {
+        let is_long = len > MOST_PAYLOAD as u64;
+        let stamps = if is_long {
+            Vec::new()
+        } else {
+            G::index_stamps(peek_whole(stream, len)?)
+        };
+        let Some((id, _)) = self.walk.announced.get(raw) else {
+            let lost = self.walk.early.index(raw, u64::from(count), &stamps);
+            absent(self.sink, lost);
             return pass(stream, len);
         };
-        let stamps = if self.found_messages.wants_stamps(id, count) {
-            let bytes = peek_whole(stream, len)?;
-            G::index_stamps(bytes)
-        } else {
-            Vec::new()
-        };
-        if self.found_messages.is_of_another(id, &stamps) {
+        if self.walk.found_messages.is_of_another(id, &stamps) {
             self.report_chunk();
         }
-        self.found_messages.behind(Behind { id, count, stamps });
+        let record = Behind { id, count, stamps };
+        self.walk.found_messages.behind(record);
         pass(stream, len)
     }
 
     /// Reports the messages of the last chunk, once everything after it has been read.
     fn report_chunk(&mut self) {
-        let (mended, surplus) = self.found_messages.report_all(self.sink);
-        if mended > 0 {
-            self.found.complete = false;
-            super::index::absent(self.sink, mended);
+        if self.walk.found_messages.is_misdated() {
+            self.damage(OTHER_TIMES);
         }
-        if surplus > 0 {
-            self.found.complete = false;
-            let text = "messages are in a chunk but not in its index";
-            self.sink
-                .notice(Notice::counted(NoticeKind::Damaged, surplus, text));
-        }
+        let (mended, surplus) = self.walk.found_messages.report_all(self.sink);
+        self.walk.early.take_back(mended);
+        absent(self.sink, mended);
+        let text = "messages are in a chunk but not in its index";
+        damaged(self.sink, surplus, text);
     }
 
     fn damage(&mut self, text: &str) {
-        self.found.complete = false;
-        self.sink.notice(Notice::new(NoticeKind::Damaged, text));
+        damaged(self.sink, 1, text);
     }
 
-    fn finish(mut self, stop: NoRecord, at: u64) -> ForwardScan {
-        self.report_chunk();
-        let early = self.early.runs.values();
-        let homeless =
-            early.map(|(stamps, _)| stamps.len() as u64).sum::<u64>() + self.early.dropped;
-        if homeless > 0 {
-            self.found.complete = false;
-            nameless(self.sink, homeless);
+    /// Gives the messages of undescribed connections to connections that are named by their numbers.
+    fn name_early(&mut self) {
+        for (raw, run) in std::mem::take(&mut self.walk.early).runs {
+            if !run.stamps.is_empty() {
+                nameless(self.sink, run.stamps.len() as u64);
+                let id = self.walk.announced.unnamed(raw, self.sink);
+                self.described(id, &run);
+            }
         }
-        let found = self.found_messages.messages + homeless;
-        if let Some(total) = self.total.filter(|total| *total > found) {
-            self.damage(&format!(
-                "the bag should contain {total} messages; found {found}"
-            ));
+    }
+
+    /// Passes on the messages that came before the description of their connection.
+    fn described(&mut self, id: Option<ConnectionId>, run: &EarlyRun) {
+        self.walk.found_messages.messages += run.stamps.len() as u64;
+        if let Some(id) = id {
+            let is_sized = run.sizes.len() == run.stamps.len();
+            let sizes = is_sized.then_some(&run.sizes[..]);
+            self.sink.stamps(id, &run.stamps, sizes);
         }
-        let (kind, text) = match stop {
-            NoRecord::End if self.ended || !G::HAS_END => return self.found,
-            // Only the index is cut, which is not needed.
-            NoRecord::End | NoRecord::Cut | NoRecord::Broken if self.ended => return self.found,
-            NoRecord::End => (
-                NoticeKind::Truncated,
-                format!("the bag was never finished; it ends at byte {at}"),
-            ),
-            NoRecord::Cut => (
-                NoticeKind::Truncated,
-                format!("the bag is cut at byte {at}"),
-            ),
-            NoRecord::Broken => (NoticeKind::Damaged, format!("no record at byte {at}")),
-            NoRecord::Io(e) => (
-                NoticeKind::Damaged,
-                format!("reading stopped at byte {at}: {e}"),
-            ),
-        };
-        self.found.complete = false;
-        self.sink.notice(Notice::new(kind, text));
-        self.found
     }
 }
 
@@ -288,13 +431,19 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
         stream: &mut ByteStream<'_>,
         (raw, time, size): (u32, Stamp, u32),
     ) -> Result<(), NoRecord> {
-        let Some((id, want)) = self.announced.get(raw) else {
+        let (first, last) = self.walk.times.unwrap_or((time, time));
+        self.walk.times = Some((first.min(time), last.max(time)));
+        let Some((id, want)) = self.walk.announced.get(raw) else {
             pass(stream, u64::from(size))?;
-            self.early.hold(raw, time, size);
+            self.walk.early.hold(raw, time, size);
+            if self.walk.early.held >= MOST_EARLY {
+                self.name_early();
+            }
             return Ok(());
         };
         hand_over(stream, (id, time, size), want, self.sink)?;
-        self.found_messages.add(id, time, size, self.sink);
+        let messages = &mut self.walk.found_messages;
+        messages.add(id, time, size, self.sink);
         Ok(())
     }
 
@@ -304,19 +453,23 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
         what: &G::Description,
         len: u64,
     ) -> Result<(), NoRecord> {
-        let new = self.announced.read(stream, (what, len), self.sink)?;
-        match new {
-            Err(_) => self.damage("the description of a connection cannot be read"),
-            Ok(Some((raw, id))) => {
-                if let Some((stamps, sizes)) = self.early.runs.remove(&raw) {
-                    self.found_messages.messages += stamps.len() as u64;
-                    self.sink.stamps(id, &stamps, Some(&sizes));
-                }
-            }
-            Ok(None) => {}
+        let new = self.walk.announced.read(stream, (what, len), self.sink)?;
+        let Ok(new) = new else {
+            self.damage("the description of a connection cannot be read");
+            return Ok(());
+        };
+        let early = new.and_then(|(raw, id)| Some((id, self.walk.early.runs.remove(&raw)?)));
+        if let Some((id, run)) = early {
+            self.described(Some(id), &run);
         }
         Ok(())
     }
+}
+
+/// Whether the bytes taken have another checksum than stated.
+fn is_other(stream: &mut ByteStream<'_>, crc: Option<u32>) -> bool {
+    crc.zip(stream.sum())
+        .is_some_and(|(stated, sum)| stated != sum)
 }
 
 /// Goes to the beginning of the next chunk after byte `from`; false if there is none before the end of the stream.
@@ -324,30 +477,73 @@ pub(super) fn next_chunk<G: Grammar>(stream: &mut ByteStream<'_>, from: u64) -> 
     if stream.position() <= from && !matches!(stream.skip(1), Ok(1)) {
         return false;
     }
-    while let Ok(window) = stream.peek(2 * STRIDE) {
-        let len = window.len();
-        let mut starts = 0..len.min(STRIDE);
-        if let Some(at) = starts.find(|at| G::is_chunk(&window[*at..])) {
-            stream.advance(at);
-            return true;
+    let mut before = BeforeChunk::<G>::new(stream);
+    // An error of reading ends the search; the walk meets it again.
+    let _ = io::copy(&mut before, &mut io::sink());
+    before.is_at_chunk
+}
+
+/// The bytes of a stream up to the next chunk.
+struct BeforeChunk<'a, 'b, G> {
+    stream: &'a mut ByteStream<'b>,
+    /// The number of next bytes at which no chunk begins.
+    free: usize,
+    /// Whether a chunk begins behind them.
+    is_at_chunk: bool,
+    grammar: PhantomData<fn() -> G>,
+}
+
+impl<'a, 'b, G: Grammar> BeforeChunk<'a, 'b, G> {
+    fn new(stream: &'a mut ByteStream<'b>) -> Self {
+        Self {
+            stream,
+            free: 0,
+            is_at_chunk: false,
+            grammar: PhantomData,
         }
-        if len <= STRIDE {
-            break;
-        }
-        stream.advance(STRIDE);
     }
-    false
+}
+
+impl<G: Grammar> io::Read for BeforeChunk<'_, '_, G> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        if self.free == 0 && !self.is_at_chunk {
+            let window = self.stream.peek(2 * STRIDE)?;
+            let searched = window.len().min(STRIDE);
+            let chunk = (0..searched).find(|at| G::is_chunk(&window[*at..]));
+            self.is_at_chunk = chunk.is_some();
+            self.free = chunk.unwrap_or(searched);
+        }
+        let most = into.len().min(self.free);
+        let read = self.stream.read(&mut into[..most])?;
+        self.free -= read;
+        Ok(read)
+    }
 }
 
 impl Early {
-    fn hold(&mut self, raw: u32, time: Stamp, size: u32) {
-        if self.held >= MOST_EARLY {
-            self.dropped += 1;
-            return;
+    /// Drops as many messages of the last chunk, since its index has them under other numbers.
+    fn take_back(&mut self, many: u64) {
+        for raw in self.last.drain(..).rev().zip(0..many).map(|(raw, _)| raw) {
+            let run = self.runs.entry(raw).or_default();
+            (run.stamps.pop(), run.sizes.pop());
         }
+    }
+
+    /// Takes an index record of the last chunk; returns the number of messages that the chunk lacks.
+    fn index(&mut self, raw: u32, count: u64, stamps: &[Stamp]) -> u64 {
+        let found = self.last.iter().filter(|own| **own == raw).count() as u64;
+        if found == 0 && self.held < MOST_EARLY {
+            self.held += stamps.len();
+            self.runs.entry(raw).or_default().stamps.extend(stamps);
+        }
+        count.saturating_sub(found)
+    }
+
+    fn hold(&mut self, raw: u32, time: Stamp, size: u32) {
         self.held += 1;
+        self.last.push(raw);
         let run = self.runs.entry(raw).or_default();
-        run.0.push(time);
-        run.1.push(size);
+        run.stamps.push(time);
+        run.sizes.push(size);
     }
 }

@@ -1,22 +1,16 @@
 //! A chunked bag that is still being written: each record once, as soon as it is complete.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use super::index::hand_over;
-use super::record::{Announced, NoRecord, RecordHead, pass, walk};
-use super::unpack::{Visitor, unpack};
+use super::forward::Walk;
 use super::{Grammar, HEAD};
-use crate::bag::adapters::Gather;
-use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::input::closed;
 use crate::bag::model::{Growing, Growth, Sink};
 use crate::bag::source::{ByteStream, FAR, FileSource};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
-use crate::base::time::Stamp;
 
-/// The position up to which a growing bag has been read, and the connections described so far.
+/// The position up to which a growing bag has been read, and the state of the walk there.
 struct GrowingChunks<G> {
     path: PathBuf,
     /// The first byte that has not been reported.
@@ -25,9 +19,13 @@ struct GrowingChunks<G> {
     len: u64,
     /// Whether the bag had its end at that time.
     is_closed: bool,
-    announced: Announced<G>,
-    allowance: Arc<Allowance>,
+    walk: Walk<G>,
+    /// The last bytes before `at` that a recorder never changes.
+    behind: Vec<u8>,
 }
+
+/// The number of bytes by which it is noticed that a bag was replaced.
+const BEHIND: u64 = 64;
 
 /// Follows a bag of this grammar.
 pub(crate) fn follow<G: Grammar>(path: &Path) -> Result<Box<dyn Growing>> {
@@ -40,18 +38,26 @@ pub(crate) fn follow<G: Grammar>(path: &Path) -> Result<Box<dyn Growing>> {
         at: 0,
         len: 0,
         is_closed: false,
-        announced: Announced::default(),
-        allowance: Arc::default(),
+        walk: Walk::default(),
+        behind: Vec::new(),
     }))
 }
 
 impl<G: Grammar> Growing for GrowingChunks<G> {
     fn poll(&mut self, sink: &mut dyn Sink) -> Result<Growth> {
-        self.find();
+        if let Some(closed) = closed(&self.path) {
+            self.path = closed;
+        }
         let source = FileSource::open(&self.path)?;
         let len = source.len();
-        if len < self.at {
-            let text = format!("the bag was shortened to {len} bytes while it was followed");
+        let fail = || Error::io("read", &self.path);
+        let behind = self.last_bytes(&source).map_err(fail())?;
+        if len < self.len || behind != self.behind {
+            let text = if len < self.len {
+                format!("the bag was shortened to {len} bytes while it was followed")
+            } else {
+                "the bag was rewritten while it was followed".to_owned()
+            };
             sink.notice(Notice::new(NoticeKind::Truncated, text));
             return Ok(Growth::Ended);
         }
@@ -62,10 +68,21 @@ impl<G: Grammar> Growing for GrowingChunks<G> {
                 Growth::Same
             });
         }
-        self.len = len;
-        self.records(&source, sink);
-        let plan = G::plan(&source).map_err(Error::io("read", &self.path))?;
+        let plan = G::plan(&source).map_err(fail())?;
         self.is_closed = plan.is_ok() || G::is_ended(&source);
+        self.len = len;
+        let mut stream = ByteStream::of_file(&source, self.at, len, FAR);
+        if self.at == 0 {
+            G::begin(&mut stream);
+        }
+        let (stop, at) = self.walk.go(&mut stream, 0, !self.is_closed, sink);
+        self.at = at;
+        if self.is_closed {
+            std::mem::take(&mut self.walk).finish(stop, at, sink);
+        }
+        self.behind = self
+            .last_bytes(&source)
+            .map_err(Error::io("read", &self.path))?;
         Ok(Growth::More)
     }
 
@@ -75,86 +92,12 @@ impl<G: Grammar> Growing for GrowingChunks<G> {
 }
 
 impl<G: Grammar> GrowingChunks<G> {
-    /// Takes the bag's new name.
-    fn find(&mut self) {
-        if let Some(closed) = closed(&self.path) {
-            self.path = closed;
-        }
-    }
-
-    /// Reports the records that have become complete.
-    fn records(&mut self, source: &FileSource, sink: &mut dyn Sink) {
-        let mut stream = ByteStream::of_file(source, self.at, self.len, FAR);
-        if self.at == 0 {
-            G::begin(&mut stream);
-        }
-        let mut gather = Gather::default();
-        // No complete record follows yet; damage is reported when the closed bag is read.
-        let _ = walk(&mut stream, u64::MAX, |stream| {
-            let mut records = Records {
-                bag: self,
-                gather: &mut gather,
-                sink: &mut *sink,
-            };
-            records.next(stream)?;
-            self.at = stream.position();
-            Ok(())
-        });
-        gather.flush(sink);
-    }
-}
-
-/// The receiver of the records of a growing bag.
-struct Records<'a, G> {
-    bag: &'a mut GrowingChunks<G>,
-    gather: &'a mut Gather,
-    sink: &'a mut dyn Sink,
-}
-
-impl<G: Grammar> Records<'_, G> {
-    /// Takes the next record, if it is complete.
-    fn next(&mut self, stream: &mut ByteStream<'_>) -> Result<(), NoRecord> {
-        match G::next(stream)? {
-            // The open chunk has no length yet: its records follow, and if compressed they cannot be read before it is
-            // closed.
-            RecordHead::Chunk(head) if head.unclosed => Err(NoRecord::Cut),
-            RecordHead::Chunk(head) if head.packed == 0 && head.how == Some(Compression::None) => {
-                Ok(())
-            }
-            record if stream.left().is_some_and(|left| left < record.len()) => Err(NoRecord::Cut),
-            RecordHead::Chunk(head) => {
-                let allowance = Arc::clone(&self.bag.allowance);
-                unpack(stream, &head, &allowance, self).map(drop)
-            }
-            RecordHead::Message { raw, time, size } => self.message(stream, (raw, time, size)),
-            RecordHead::Description { what, len } => self.description(stream, &what, len),
-            record => pass(stream, record.len()),
-        }
-    }
-}
-
-impl<G: Grammar> Visitor<G> for Records<'_, G> {
-    fn message(
-        &mut self,
-        stream: &mut ByteStream<'_>,
-        (raw, time, size): (u32, Stamp, u32),
-    ) -> Result<(), NoRecord> {
-        let Some((id, want)) = self.bag.announced.get(raw) else {
-            return pass(stream, u64::from(size));
-        };
-        hand_over(stream, (id, time, size), want, self.sink)?;
-        self.gather.add(id, time, size, self.sink);
-        Ok(())
-    }
-
-    fn description(
-        &mut self,
-        stream: &mut ByteStream<'_>,
-        what: &G::Description,
-        len: u64,
-    ) -> Result<(), NoRecord> {
-        // Errors are reported when the closed bag is read.
-        let new = self.bag.announced.read(stream, (what, len), self.sink);
-        new.map(drop)
+    /// The bytes before byte `at`, as far as the head of a chunk.
+    fn last_bytes(&self, source: &FileSource) -> std::io::Result<Vec<u8>> {
+        let len = self.at.saturating_sub(self.walk.body).min(BEHIND);
+        let mut bytes = vec![0; usize::try_from(len).unwrap_or(0)];
+        let got = source.read_at(self.at - len, &mut bytes)?;
+        bytes.truncate(got);
+        Ok(bytes)
     }
 }

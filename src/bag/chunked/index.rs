@@ -9,7 +9,7 @@ use super::Grammar;
 use super::record::{Connections, RecordHead};
 use crate::bag::adapters::MOST_CUTS;
 use crate::bag::decompress::{Allowance, Compression};
-use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want};
+use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want, damaged};
 use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::OUT_OF_ORDER_NS;
@@ -101,17 +101,22 @@ impl Index {
         }
     }
 
-    /// Whether these are the first and last times in the index. A message at 0 does not count: some writers take 0 for
-    /// an unknown time and state the time of another message.
-    pub(super) fn spans(&self, first: Stamp, last: Stamp) -> bool {
-        let (mut low, mut high) = (Stamp::MAX, Stamp::MIN);
-        for at in &self.stamps {
-            low = low.min(*at);
-            high = high.max(*at);
-        }
-        let is_first = low == first || low == Stamp(0);
-        self.stamps.is_empty() || is_first && high == last
+    /// The first and the last time in it.
+    pub(super) fn times(&self) -> Option<(Stamp, Stamp)> {
+        bounds(&self.stamps)
     }
+}
+
+/// The first and the last of some times.
+pub(super) fn bounds(stamps: &[Stamp]) -> Option<(Stamp, Stamp)> {
+    let ends = stamps.iter().map(|at| (*at, *at));
+    ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+}
+
+/// Whether the first and the last time in a chunk are the stated ones. A message at 0 does not count: some writers take 0
+/// for an unknown time and state the time of another message.
+pub(super) fn spans((low, high): (Stamp, Stamp), (first, last): (Stamp, Stamp)) -> bool {
+    (low == first || low == Stamp(0)) && high == last
 }
 
 /// The position of a chunk's records.
@@ -283,16 +288,23 @@ fn step(wanted: &[Wanted]) -> usize {
     if between <= NEAR as u64 { CLOSE } else { NEAR }
 }
 
+/// The notice about other times.
+pub(super) const OTHER_TIMES: &str =
+    "chunks begin or end at other times than the bag's index states";
+
 /// Reports messages of a connection that the bag does not describe.
 pub(crate) fn nameless(sink: &mut dyn Sink, count: u64) {
     let text = "messages belong to a connection that the bag does not describe";
-    sink.notice(Notice::counted(NoticeKind::Damaged, count, text));
+    damaged(sink, count, text);
 }
 
 /// Reports messages that only the index has.
 pub(super) fn absent(sink: &mut dyn Sink, count: u64) {
-    let text = "messages are in the index but not in their chunk";
-    sink.notice(Notice::counted(NoticeKind::Damaged, count, text));
+    damaged(
+        sink,
+        count,
+        "messages are in the index but not in their chunk",
+    );
 }
 
 /// Passes on the wanted part of the message at the position of `stream`, and skips it.

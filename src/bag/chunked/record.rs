@@ -8,7 +8,7 @@ use super::Grammar;
 use super::index::{hand_over_slice, nameless};
 use crate::bag::adapters::Gather;
 use crate::bag::decompress::Compression;
-use crate::bag::model::{Connection, ConnectionId, MOST_PAYLOAD, Sink, Want};
+use crate::bag::model::{Connection, ConnectionId, Encoding, MOST_PAYLOAD, Sink, Want};
 use crate::bag::source::ByteStream;
 use crate::base::budget::CONNECTIONS;
 use crate::base::time::Stamp;
@@ -24,13 +24,20 @@ pub(crate) enum RecordHead<D> {
     Description { what: D, len: u64 },
     /// The number of messages of a connection in the previous chunk; their entries follow.
     Index { raw: u32, count: u32, len: u64 },
-    /// The number of messages that the bag states.
-    Total { messages: u64, len: u64 },
+    /// The numbers of messages and chunks that the bag states.
+    Total { stated: Counts, len: u64 },
+    /// The position of a chunk that the bag's index lists, and the times of its first and last message.
+    Listed {
+        at: u64,
+        times: (Stamp, Stamp),
+        len: u64,
+    },
     /// The end of the data: no message follows. `crc` is the CRC-32 of all bytes of the bag before the `len` bytes, if
     /// it is stated.
     DataEnd { len: u64, crc: Option<u32> },
-    /// The end of the file: only the closing bytes of the bag follow.
-    FileEnd { len: u64 },
+    /// The end of the file: only the closing bytes of the bag follow. `crc` is the CRC-32 of all bytes from the end of the
+    /// data up to the last four of this record, if it is stated.
+    FileEnd { len: u64, crc: Option<u32> },
     /// A record that is ignored.
     Other { len: u64 },
     /// An ignored record that only occurs after the end of the data.
@@ -41,6 +48,14 @@ pub(crate) enum RecordHead<D> {
 }
 
 impl<D> RecordHead<D> {
+    /// Whether it only occurs after the end of the data, in formats that state one.
+    pub(crate) fn is_of_the_end(&self) -> bool {
+        matches!(
+            self,
+            Self::Tail { .. } | Self::Total { .. } | Self::Listed { .. }
+        )
+    }
+
     /// The number of bytes that follow, all of them of this record.
     pub(crate) fn len(&self) -> u64 {
         match self {
@@ -49,13 +64,22 @@ impl<D> RecordHead<D> {
             Self::Description { len, .. }
             | Self::Index { len, .. }
             | Self::Total { len, .. }
+            | Self::Listed { len, .. }
             | Self::DataEnd { len, .. }
-            | Self::FileEnd { len }
+            | Self::FileEnd { len, .. }
             | Self::Other { len }
             | Self::Tail { len }
             | Self::Unknown { len, .. } => *len,
         }
     }
+}
+
+/// The numbers of a bag's messages, channels and chunks; 0 if they are not stated.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Counts {
+    pub(crate) messages: u64,
+    pub(crate) channels: u32,
+    pub(crate) chunks: u32,
 }
 
 /// The head of a chunk, before its records.
@@ -143,9 +167,9 @@ pub(crate) fn peek_whole<'s>(
     Ok(bytes)
 }
 
-/// Skips `len` bytes, which must exist: if the length exceeds the file, nothing is skipped.
+/// Skips `len` bytes, which must exist: if the length exceeds the bag, nothing is skipped.
 pub(crate) fn pass(stream: &mut ByteStream<'_>, len: u64) -> Result<(), NoRecord> {
-    if stream.left().is_some_and(|left| left < len) {
+    if !stream.has(len)? {
         return Err(NoRecord::Cut);
     }
     match stream.skip(len)? {
@@ -214,6 +238,18 @@ impl<G: Grammar> Announced<G> {
             self.describe(what, peek_whole(stream, len)?, sink)
         };
         pass(stream, len).map(|()| new)
+    }
+
+    /// Announces a connection that the bag calls `raw` and does not describe.
+    pub(super) fn unnamed(&mut self, raw: u32, sink: &mut dyn Sink) -> Option<ConnectionId> {
+        let connection = Connection {
+            topic: format!("connection {raw}").into(),
+            encoding: Encoding::Other(String::new()),
+            ..Connection::default()
+        };
+        let connection = self.connections.add(raw, connection)?;
+        self.wants.push(sink.connection(connection));
+        Some(connection.id)
     }
 
     /// Announces the connection of a description if it is a new one; returns it with the bag's number for it.

@@ -53,6 +53,9 @@ pub(super) fn unpack<G: Grammar>(
         },
         (Some(how), _) => summed(stream, head, how, allowance, visitor),
     };
+    // Zeros over the head of a small chunk leave an empty one, and its records behind it.
+    let is_blank = head.packed == 0 && head.padding > 0;
+    let found = found.or_else(|| is_blank.then(|| NOT_AS_LONG.to_owned()));
     let rest = end.saturating_sub(stream.position());
     // A chunk cut by the end of the file is reported once, as the cut.
     pass(stream, rest.saturating_add(head.padding))?;

@@ -10,7 +10,7 @@ use mcap::records::op;
 
 use super::{Described, Mcap};
 use crate::bag::checksum::Checksum;
-use crate::bag::chunked::{ChunkHead, Connections, NoRecord, RecordHead};
+use crate::bag::chunked::{ChunkHead, Connections, Counts, NoRecord, RecordHead};
 use crate::bag::decompress::Compression;
 use crate::bag::model::{Connection, Encoding};
 use crate::bag::source::ByteStream;
@@ -55,9 +55,10 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
     Ok(match kind {
         op::MESSAGE_INDEX => index(stream, len)?,
         op::STATISTICS if len >= STATISTICS => RecordHead::Total {
-            messages: FieldCursor(stream.peek(8)?).u64().ok_or(NoRecord::Cut)?,
+            stated: counts(stream.peek(STATISTICS as usize)?).ok_or(NoRecord::Cut)?,
             len,
         },
+        op::CHUNK_INDEX => listed(stream.peek(24)?, len).ok_or(NoRecord::Cut)?,
         op::SCHEMA => RecordHead::Description {
             what: Described::Schema,
             len,
@@ -78,19 +79,35 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
             }
             RecordHead::Other { len }
         }
-        op::CHUNK_INDEX | op::ATTACHMENT_INDEX | op::METADATA_INDEX | op::SUMMARY_OFFSET => {
-            RecordHead::Tail { len }
-        }
+        op::ATTACHMENT_INDEX | op::METADATA_INDEX | op::SUMMARY_OFFSET => RecordHead::Tail { len },
         op::DATA_END if len == DATA_END => RecordHead::DataEnd {
             len,
             crc: data_crc(stream.peek(4)?),
         },
-        op::FOOTER if len == FOOTER => RecordHead::FileEnd { len },
+        op::FOOTER if len == FOOTER => RecordHead::FileEnd {
+            len,
+            crc: FieldCursor(stream.peek(20)?.get(16..).unwrap_or_default())
+                .u32()
+                .filter(|crc| *crc != 0),
+        },
         op::DATA_END | op::FOOTER => return Err(NoRecord::Broken),
         kind => RecordHead::Unknown {
             len,
             extension: kind >= FIRST_EXTENSION,
         },
+    })
+}
+
+/// The counts of the whole file in a statistics record.
+pub(super) fn counts(record: &[u8]) -> Option<Counts> {
+    let mut cursor = FieldCursor(record);
+    let messages = cursor.u64()?;
+    let (_schemas, channels) = (cursor.u16()?, cursor.u32()?);
+    let (_attachments, _metadata) = (cursor.u32()?, cursor.u32()?);
+    Some(Counts {
+        messages,
+        channels,
+        chunks: cursor.u32()?,
     })
 }
 
@@ -102,6 +119,17 @@ fn data_crc(content: &[u8]) -> Option<u32> {
     sum.add(&[op::DATA_END]);
     sum.add(&DATA_END.to_le_bytes());
     Some(sum.crc())
+}
+
+/// The chunk that a chunk index lists.
+fn listed(content: &[u8], len: u64) -> Option<RecordHead<Described>> {
+    let mut cursor = FieldCursor(content);
+    let times = (cursor.u64()?, cursor.u64()?);
+    Some(RecordHead::Listed {
+        at: cursor.u64()?,
+        times: (Stamp::from_nanos(times.0), Stamp::from_nanos(times.1)),
+        len,
+    })
 }
 
 /// The length of a record according to the lengths in it; `None` if these first bytes do not contain them.

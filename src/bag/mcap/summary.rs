@@ -9,8 +9,8 @@ use super::records::{self, DATA_END, ENTRY, FOOTER, FieldCursor, HEAD};
 use super::{Described, Mcap};
 use crate::bag::checksum::CrcReader;
 use crate::bag::chunked::{
-    Chunk, ChunkPlan, Grammar as _, IndexSum, MOST_CHUNKS, NoRecord, RecordHead, Unindexed, Used,
-    pass, walk,
+    Chunk, ChunkPlan, Counts, Grammar as _, IndexSum, MOST_CHUNKS, NoRecord, RecordHead, Unindexed,
+    Used, pass, walk,
 };
 use crate::bag::model::MOST_PAYLOAD;
 use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
@@ -96,7 +96,7 @@ struct Summary {
     plan: ChunkPlan,
     grammar: Mcap,
     used: Used,
-    statistics: Option<Statistics>,
+    statistics: Option<Counts>,
     /// Whether a channel refers to a schema that the summary does not repeat.
     untyped: bool,
 }
@@ -124,7 +124,7 @@ impl Summary {
                 op::SCHEMA => records::schema(&mut self.grammar, record).ok_or(NoRecord::Broken)?,
                 // A channel may precede its schema.
                 op::CHANNEL if channels.len() < MOST_CHANNELS => channels.push(record.to_vec()),
-                op::STATISTICS => self.statistics = statistics(record),
+                op::STATISTICS => self.statistics = records::counts(record),
                 op::CHUNK_INDEX => {
                     if self.plan.chunks.len() >= MOST_CHUNKS {
                         return Err(NoRecord::Broken);
@@ -235,25 +235,6 @@ fn gaps(source: &FileSource, plan: &ChunkPlan) -> Result<(), Unindexed> {
         free = end;
     }
     Ok(())
-}
-
-/// The counts of the whole file, as stated.
-struct Statistics {
-    messages: u64,
-    channels: u32,
-    chunks: u32,
-}
-
-fn statistics(record: &[u8]) -> Option<Statistics> {
-    let mut cursor = FieldCursor(record);
-    let messages = cursor.u64()?;
-    let (_schemas, channels) = (cursor.u16()?, cursor.u32()?);
-    let (_attachments, _metadata) = (cursor.u32()?, cursor.u32()?);
-    Some(Statistics {
-        messages,
-        channels,
-        chunks: cursor.u32()?,
-    })
 }
 
 /// The chunk of a chunk index record.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Described, Rosbag1};
-use crate::bag::chunked::{ChunkHead, NoRecord, RecordHead};
+use crate::bag::chunked::{ChunkHead, Counts, NoRecord, RecordHead};
 use crate::bag::decompress::Compression;
 use crate::bag::model::Connection;
 use crate::bag::source::ByteStream;
@@ -67,7 +67,20 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
             count,
             len: u64::from(count.checked_mul(ENTRY).ok_or(NoRecord::Broken)?),
         },
-        Header::Bag { .. } | Header::ChunkInfo { .. } => RecordHead::Other { len },
+        Header::Bag { chunks, .. } => RecordHead::Total {
+            stated: Counts {
+                chunks,
+                ..Counts::default()
+            },
+            len,
+        },
+        Header::ChunkInfo {
+            pos, start, end, ..
+        } => RecordHead::Listed {
+            at: pos,
+            times: (start, end),
+            len,
+        },
         Header::Unknown => RecordHead::Unknown {
             len,
             extension: false,
@@ -86,7 +99,7 @@ fn chunk(compression: &[u8], size: u32, len: u64) -> ChunkHead {
         crc: None,
         times: None,
         misnamed: false,
-        unclosed: size == 0 && len == 0 && how.is_some_and(|how| how != Compression::None),
+        unclosed: len == 0 && how.is_some_and(|how| how != Compression::None),
     }
 }
 

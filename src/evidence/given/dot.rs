@@ -190,9 +190,12 @@ fn tokens(text: &str) -> Result<Vec<DotToken>, usize> {
             }
             '{' | '}' | '[' | ']' | ';' | ',' | '=' | ':' => (1, Some((c.to_string(), false))),
             _ => {
-                let end = |c: char| c.is_whitespace() || "{}[];,=:\"".contains(c);
-                let len = rest.find(end).unwrap_or(rest.len());
-                let len = rest[..len].find("->").filter(|at| *at > 0).unwrap_or(len);
+                let is_end = |(at, c): &(usize, char)| {
+                    let is_arrow = *at > 0 && rest[*at..].starts_with("->");
+                    is_arrow || c.is_whitespace() || "{}[];,=:\"".contains(*c)
+                };
+                let end = rest.char_indices().find(is_end);
+                let len = end.map_or(rest.len(), |(at, _)| at);
                 (len, Some((rest[..len].to_owned(), true)))
             }
         };

@@ -119,8 +119,8 @@ pub(crate) fn file_stem(topic: &str) -> String {
         }
     }
     stem.truncate(LONGEST);
-    // Neither hidden nor empty.
-    if stem.is_empty() || stem.starts_with('.') {
+    // Neither hidden nor empty, nor an option of a command.
+    if stem.is_empty() || stem.starts_with(['.', '-']) {
         stem.insert(0, '_');
     }
     stem

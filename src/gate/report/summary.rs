@@ -58,7 +58,7 @@ fn headline(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let sign = if any(Severity::Error) {
         "❌"
     } else if any(Severity::Warning) {
-        "⚠️"
+        "⚠"
     } else if verdict.is_blind() {
         "❔"
     } else {
@@ -122,7 +122,7 @@ fn finding_row(facts: &Facts<'_>, finding: &Finding, is_alone: bool) -> String {
     let sign = if finding.severity == Severity::Error {
         "❌"
     } else {
-        "⚠️"
+        "⚠"
     };
     let when = match finding.when {
         Some(span) => facts.stretch(span),

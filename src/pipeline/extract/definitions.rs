@@ -55,9 +55,10 @@ fn msg_files(folder: &Path) -> Result<Vec<(String, PathBuf)>> {
             let (path, kind) = (entry.path(), entry.file_type());
             if kind.is_ok_and(|kind| kind.is_dir()) {
                 waiting.push(path);
-            } else if path
-                .extension()
-                .is_some_and(|end| KINDS.iter().any(|kind| end == *kind))
+            } else if path.is_file()
+                && path
+                    .extension()
+                    .is_some_and(|end| KINDS.iter().any(|kind| end == *kind))
             {
                 let is_kind = KINDS.iter().any(|kind| folder.ends_with(kind));
                 let outer = folder.parent().filter(|_| is_kind);

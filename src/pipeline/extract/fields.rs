@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, BufWriter};
 
-use super::{Extract, Extracted, definitions, of_report, stop};
+use super::{Extract, Extracted, definitions, stop};
 use crate::bag::{Connection, ConnectionId, Input, Message, Sink, Want};
 use crate::base::error::{Error, Result};
 use crate::base::name::{NodeName, TopicName};
@@ -19,6 +19,7 @@ use crate::export::tables::folder::{Folder, Part, file_stem};
 use crate::export::tables::writer::begin;
 use crate::pipeline::Watch;
 use crate::pipeline::collect::no_messages;
+use crate::pipeline::times::of_report;
 use crate::view::none_pass;
 
 /// The columns before a message's fields: its log time, and its publisher if known.
@@ -36,7 +37,8 @@ const MOST_NAMED: usize = 3;
 const MOST_HELD_IN_ALL: usize = 64 << 20;
 
 pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
-    let range = job.range(watch)?;
+    let mut lost = Lost::default();
+    let range = job.range(&mut lost.notices, watch)?;
     let types = definitions::read(&job.msg_paths)?;
     let mut tables = FieldTables {
         folder: Folder::create(job.target.path())?,
@@ -46,7 +48,6 @@ pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted>
         waiting: 0,
         failed: None,
     };
-    let mut lost = Lost::default();
     for mut reader in job.open()? {
         let mut one = OfBag {
             job,

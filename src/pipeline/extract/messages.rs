@@ -9,6 +9,7 @@ use crate::evidence::times::Timed;
 use crate::export::sink::OutputSink;
 use crate::export::tables::writer::begin;
 use crate::pipeline::Watch;
+use crate::pipeline::collect::no_messages;
 use crate::pipeline::times::{MessageTimes, Sender};
 use crate::view::none_pass;
 
@@ -18,16 +19,21 @@ const MOST_ROWS: usize = 16 * 1024;
 /// Reads all times first, then writes them sorted, so that bags that overlap in time make one sorted table.
 pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
     let sink = OutputSink::create(&job.target, None)?;
-    let range = job.range(watch)?;
     let mut times = MessageTimes::new(&job.topics, Want::Sizes);
+    let range = job.range(&mut times.notices, watch)?;
     for mut reader in job.open()? {
         times.read(&mut *reader, range, watch)?;
         stop(watch)?;
     }
-    times.finish()?;
+    let aside = times.finish()?;
+    times.notices.extend(aside);
     let topics: Vec<&str> = times.topics.iter().map(TopicName::as_str).collect();
     if let Some(error) = none_pass("--topic-filter", &job.topics, &topics) {
         return Err(error);
+    }
+    let is_whole = job.topics.passes_all() && job.start.is_none() && job.end.is_none();
+    if is_whole && times.span().is_none() {
+        return Err(no_messages(&job.inputs, &times.notices));
     }
     Ok(Extracted {
         tables: 1,

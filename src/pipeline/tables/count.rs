@@ -64,7 +64,8 @@ pub fn count(name: &str, inputs: &[Input], counting: &Counting) -> Result<Counte
         let mut reader = bag::open(&input, &OpenOptions::default())?;
         format = times.read(&mut *reader, None, &mut Unwatched)?.format;
     }
-    times.finish()?;
+    let aside = times.finish()?;
+    times.notices.extend(aside);
     let (first, _, messages) = times.stamps.extent().unwrap_or_default();
     let windows = Windows {
         origin: match counting.align {
