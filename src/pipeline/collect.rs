@@ -195,7 +195,7 @@ const SET_BACK: &str = "the recorder's clock went back by";
 
 /// The collection options without comparing payloads of large bags, where reading all payloads would defeat the index.
 /// They are compared on request.
-fn affordable(reading: &Reading) -> collector::CollectOptions {
+pub(super) fn affordable(reading: &Reading) -> collector::CollectOptions {
     let mut options = reading.collect.clone();
     let sizes = reading.inputs.iter().filter_map(bag::size_on_disk);
     let is_large = sizes.fold(0, u64::saturating_add) > options.payload_bytes;
