@@ -34,9 +34,9 @@ use serde::{Deserialize, Serialize};
 use message::dynamic;
 use source::Read::{Log, Parameters, Payload};
 use source::{
-    NOTHING, action, connection, contract, conventions, diagnostics, discovery, echo, equal_stamps,
-    lifecycle, log_text, parameters, payload, qos, recorder, rosgraph, rosout, service_event,
-    sim_time, sister, statistics,
+    NOTHING, action, connection, contract, conventions, diagnostics, echo, equal_stamps, lifecycle,
+    log_text, parameters, payload, qos, recorder, rosgraph, rosout, service_event, sim_time,
+    statistics,
 };
 
 /// A set of kinds of evidence: bits at the indices of rows in [`SOURCES`].
@@ -165,8 +165,6 @@ pub const SOURCES: &[Source] = sources! {
                    (&[rosgraph::NODE_SHAPE], Payload(rosgraph::read_node))],
           holds: true,
           conclude: &[rosgraph::conclude] }
-    "discovery" "`ros_discovery_info` (`rmw_dds_common/msg/ParticipantEntitiesInfo`)"
-        { reads: &[(&[discovery::SHAPE], Payload(discovery::read))] }
     "lifecycle" "`<node>/transition_event` (`lifecycle_msgs/msg/TransitionEvent`)"
         { reads: &[(&[lifecycle::SHAPE], Payload(lifecycle::read))], own: true }
     "service_event" "`<service>/_service_event` of service introspection"
@@ -211,6 +209,10 @@ pub const SOURCES: &[Source] = sources! {
         { reads: &[(dynamic::LOGS, Log(echo::read))], conclude: &[echo::conclude] }
     "contract" "well-known nodes, by name and source file: their topics of the right type"
         { reads: &[(dynamic::LOGS, Log(contract::read))], conclude: &[contract::conclude] }
+    "beside" "log messages that come with the messages of one topic"
+        { conclude: &[echo::conclude_beside] }
+    "found" "a topic that the recorder finds while a single node starts"
+        { conclude: &[log_text::conclude_found] }
     "only_publisher" "messages without a publisher, of topics with one known publisher"
         { conclude: &[conventions::only_publisher] }
     "payload" "messages forwarded byte by byte from input to output"
@@ -219,8 +221,6 @@ pub const SOURCES: &[Source] = sources! {
         { conclude: &[equal_stamps::conclude] }
     "tf_pair" "a subscriber of `/tf` also subscribes to `/tf_static`, and vice versa"
         { conclude: &[conventions::tf_pair] }
-    "sister" "a node whose twin in another namespace publishes the same and subscribes to more"
-        { conclude: &[sister::conclude] }
     "anonymous" "the start inside an anonymous name (`_PID_MILLISECONDS`, `_NANOSECONDS`)"
         { conclude: &[conventions::anonymous] }
     "recorder" "the recorder subscribes to everything it records; its log records name its source file"

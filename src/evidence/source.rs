@@ -6,7 +6,6 @@ pub(crate) mod connection;
 pub(crate) mod contract;
 pub(crate) mod conventions;
 pub(crate) mod diagnostics;
-pub(crate) mod discovery;
 pub(crate) mod echo;
 pub(crate) mod equal_stamps;
 pub(crate) mod lifecycle;
@@ -19,7 +18,6 @@ pub(crate) mod rosgraph;
 pub(crate) mod rosout;
 pub(crate) mod service_event;
 pub(crate) mod sim_time;
-pub(crate) mod sister;
 pub(crate) mod statistics;
 
 use crate::base::name::{in_space, plain_type};

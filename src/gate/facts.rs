@@ -103,17 +103,11 @@ impl TopicIn<'_> {
 /// Kinds of evidence for what should have run, not for what did. The user's topology file states what did.
 const DECLARING: [&str; 2] = ["source", "launch"];
 /// Kinds of evidence that name every ROS 1 node with recorded messages.
-const NAMING: [&str; 5] = [
-    "connection",
-    "statistics",
-    "rosgraph",
-    "discovery",
-    "topology",
-];
+const NAMING: [&str; 4] = ["connection", "statistics", "rosgraph", "topology"];
 /// Evidence that names every ROS 2 node started during the recording: it declares parameters then.
 const STARTING: [&str; 1] = ["parameter_events"];
 /// Evidence that lists all subscribers of a topic.
-const LISTING: [&str; 4] = ["rosgraph", "discovery", "statistics", "topic_statistics"];
+const LISTING: [&str; 3] = ["rosgraph", "statistics", "topic_statistics"];
 
 /// The events that take messages away.
 pub(crate) const ENDS: &[Kind] = &[Kind::Stopped, Kind::Restarted, Kind::Silent];

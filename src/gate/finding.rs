@@ -117,8 +117,8 @@ kinds! {
          measured or stated count.";
     SubscriberMissing "subscriber-missing" "to" "changed":
         "A node does not subscribe to an expected topic.",
-        "`to: [/a]` names some of them. Undecidable unless the bag lists subscribers: by `/rosgraph`, statistics, \
-         discovery, or this node's log of its connections.";
+        "`to: [/a]` names some of them. Undecidable unless the bag lists subscribers: by `/rosgraph`, statistics, or \
+         this node's log of its connections.";
     TooManyChanges "too-many-changes" "" "":
         "There were more, or fewer, changes than allowed.",
         "`during: -30s.., changes: ..0` counts the events that `bagreel events` prints.";

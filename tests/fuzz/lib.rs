@@ -182,7 +182,6 @@ const KNOWN: &[(&str, &str)] = &[
     ("/rosgraph", "rosgraph_monitor_msgs/msg/Graph"),
     ("/topic_statistics", "rosgraph_monitor_msgs/msg/TopicStatistics"),
     ("/statistics", "statistics_msgs/msg/MetricsMessage"),
-    ("/ros_discovery_info", "rmw_dds_common/msg/ParticipantEntitiesInfo"),
     ("/add/_service_event", "example_interfaces/srv/AddTwoInts_Event"),
     ("/odd", "odd/msg/Odd"),
 ];

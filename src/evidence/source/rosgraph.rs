@@ -118,7 +118,7 @@ fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
         }
         let id = context.name(name);
         context.states_in(group, Observation::Node(id), || {
-            format!("{name} is in the graph{}", parameters(node))
+            format!("{name} is in the graph")
         });
         if !seen.insert(name) {
             let twice = || format!("{name} occurs twice in the graph");
@@ -242,38 +242,6 @@ fn quality(qos: &MessageValue) -> Option<String> {
     let reliability = word("reliability", ["reliable", "best_effort"])?;
     let durability = word("durability", ["transient_local", "volatile"])?;
     Some(format!("{reliability} {durability}{history}"))
-}
-
-/// The parameters of a node as text, with their values except floating-point numbers and lists.
-fn parameters(node: &MessageValue) -> String {
-    let values = node.list("parameter_values").iter().map(Some);
-    let values = values.chain(std::iter::repeat(None));
-    let word = |value: &MessageValue| match (value.field("type")?, value) {
-        (MessageValue::Byte(1), value) => {
-            Some((value.field("bool_value")? != &MessageValue::Byte(0)).to_string())
-        }
-        (MessageValue::Byte(2), value) => match value.field("integer_value")? {
-            MessageValue::Number(number) => number.map(|number| number.to_string()),
-            _ => None,
-        },
-        (MessageValue::Byte(4), value) => Some(value.text("string_value").to_owned()),
-        _ => None,
-    };
-    let all = node
-        .list("parameters")
-        .iter()
-        .zip(values)
-        .map(|(parameter, value)| {
-            let value = value
-                .and_then(word)
-                .map_or_else(String::new, |word| format!(" = {word}"));
-            format!("{}{value}", parameter.text("name"))
-        });
-    let all: Vec<String> = all.collect();
-    match all.len() {
-        0 => String::new(),
-        _ => format!("; parameters: {}", all.join(", ")),
-    }
 }
 
 /// The policy because of which a subscriber receives nothing: it requests more than is offered (DDS 1.4,
