@@ -111,7 +111,7 @@ fn a_node_that_declares_its_parameters_after_messages_of_its_own_topic_has_resta
     };
     fs::write(&path, mcap::write(&bag, &options)).unwrap();
     let found = restarts(&[path], Stdio::null());
-    assert_eq!(found, ["00:49.9  /nav restarted"]);
+    assert_eq!(found, ["00:49–01:00  /nav restarted"]);
 }
 
 #[test]

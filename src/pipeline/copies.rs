@@ -4,8 +4,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Reading;
-use super::collect::affordable;
-use super::inputs::{given_offset, in_time, space_of};
+use super::inputs::{affordable, given_offset, in_time, space_of};
 use crate::bag::straight::{Seam, pass};
 use crate::bag::{self, ConnectionId, Input, Message, OpenOptions, Sink};
 use crate::base::error::Result;

@@ -8,6 +8,7 @@ use crate::base::name::is_log;
 use crate::base::role::start;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::observation::{Confidence, Name, SourceId};
+use crate::evidence::source::SHARED;
 
 // Bonds: a node that publishes a bond topic (`bond/Status`) also subscribes to it.
 
@@ -76,18 +77,6 @@ pub(crate) fn anonymous(source: SourceId, known: &mut Conclusions<'_>) {
 
 // The publisher of a topic with messages that name none: if only one node is known to publish it, the messages are from
 // that node. For example, if only `/gps` is known to publish `/fix` from its log, it sent all messages of `/fix`.
-
-/// Topics that any node may publish, so that one known publisher does not imply that it is the only one.
-pub(crate) const SHARED: [&str; 8] = [
-    "/tf",
-    "/tf_static",
-    "/rosout",
-    "/rosout_agg",
-    "/diagnostics",
-    "/parameter_events",
-    "/statistics",
-    "/clock",
-];
 
 pub(crate) fn only_publisher(source: SourceId, known: &mut Conclusions<'_>) {
     for (at, stream) in known.streams.iter().enumerate() {

@@ -12,7 +12,7 @@ use crate::evidence::inference::{
 };
 use crate::evidence::message::log::{LogRecord, is_ros1_log};
 use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
-use crate::evidence::source::{SourceContext, conventions};
+use crate::evidence::source::{SHARED, SourceContext};
 use crate::evidence::source_id;
 
 pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
@@ -293,7 +293,7 @@ pub(crate) fn conclude_found(source: SourceId, known: &mut Conclusions<'_>) {
         let nodes: BTreeSet<Name> = near.map(|(_, node)| *node).collect();
         let name = known.text(topic);
         // Feedback is found when its first client starts, since it is sent only then.
-        let is_of_any = is_feedback(&name) || conventions::SHARED.contains(&&*name);
+        let is_of_any = is_feedback(&name) || SHARED.contains(&&*name);
         let is_known = is_of_any || known.publishers(topic).next().is_some();
         if let (Some(node), 1, false) = (nodes.first(), nodes.len(), is_known) {
             known.infer_publisher(source, *node, topic, |known| {
