@@ -211,6 +211,10 @@ pub const SOURCES: &[Source] = sources! {
         { reads: &[(dynamic::LOGS, Log(echo::read))], conclude: &[echo::conclude] }
     "contract" "well-known nodes, by name and source file: their topics of the right type"
         { reads: &[(dynamic::LOGS, Log(contract::read))], conclude: &[contract::conclude] }
+    "beside" "log messages that come with the messages of one topic"
+        { conclude: &[echo::conclude_beside] }
+    "found" "a topic that the recorder finds while a single node starts"
+        { conclude: &[log_text::conclude_found] }
     "only_publisher" "messages without a publisher, of topics with one known publisher"
         { conclude: &[conventions::only_publisher] }
     "payload" "messages forwarded byte by byte from input to output"

@@ -432,6 +432,47 @@ fn what_two_recorders_recorded_counts_once() {
     assert_eq!(stopped.count(), 0);
 }
 
+#[test]
+fn a_recording_of_which_nothing_is_read_is_compared_with_one_that_is_read() {
+    // Short messages without stamps; the numbers of either camera begin anew.
+    let recorder = |is_whole: bool, ahead: i64| {
+        let mut bag = Recording::default();
+        if is_whole {
+            let clock = bag.publisher("/gazebo", "/clock", "rosgraph_msgs/Clock");
+            "time clock\n".clone_into(&mut bag.publishers[clock].definition);
+            bag.messages.push((clock, ORIGIN, vec![0; 8]));
+        }
+        for (node, topic, span) in [
+            ("/camera_1", "/image", 0..300),
+            ("/camera_2", "/image", 300..600),
+            ("/lidar", "/scan", 0..600),
+            ("/base", "/odom", 0..600),
+        ] {
+            let place = bag.publisher(node, topic, "std_msgs/UInt16");
+            for at in span.clone() {
+                let number = u16::try_from(at - span.start).unwrap().to_le_bytes();
+                let at = ORIGIN + ahead + at * SECOND / 10;
+                bag.messages.push((place, at, number.to_vec()));
+            }
+        }
+        bag.messages.sort_by_key(|message| message.1);
+        bag
+    };
+    for ahead in [4_000_000, 3600 * SECOND] {
+        let both = mission(&[recorder(true, 0), recorder(false, ahead)], |_, _| {});
+        let says = |text: &str| both.notices.iter().any(|n| n.text.contains(text));
+        assert!(says("left out 1800 messages"), "{:?}", both.notices);
+        assert_eq!(both.span.nanos() / SECOND, 59);
+    }
+    // In simulated time it may be another run, so it is set aside.
+    let both = mission(
+        &[recorder(false, -ORIGIN + SECOND), recorder(true, 0)],
+        |_, _| {},
+    );
+    assert!(!both.notices.iter().any(|n| n.text.contains("left out")));
+    assert!(both.span.start.0 >= ORIGIN);
+}
+
 /// A minute of three nodes in a simulation and of `/joystick`, which runs in wall time; `simulated` is the simulated time for
 /// the milliseconds since the start, and without it nothing of the simulation is recorded.
 fn simulation(simulated: impl Fn(i64) -> Option<i64>) -> Recording {

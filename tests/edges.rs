@@ -381,9 +381,74 @@ fn a_topic_in_a_private_namespace_belongs_to_its_node() {
             ("/arm/state", "a/msg/State"),
             ("/arm/command", "a/msg/Command"),
             ("/r1/scan", "a/msg/Scan"),
+            ("/r1/nav", "a/msg/Path"),
         ],
     );
-    assert_eq!(edges(&bag, "private_name"), ["/arm > /arm/state inferred"]);
+    let expected = ["/arm > /arm/state inferred", "/r1/nav > /r1/nav inferred"];
+    assert_eq!(edges(&bag, "private_name"), expected);
+}
+
+#[test]
+fn a_topic_found_while_one_node_starts_is_its_own() {
+    let found = |others: &[i64]| {
+        let mut bag = Recording::default();
+        let events = bag.topic2("/parameter_events", "rcl_interfaces/msg/ParameterEvent");
+        let log = bag.topic2("/rosout", "rcl_interfaces/msg/Log");
+        for (topic, at) in [
+            ("/odom", 100),
+            ("/plan", 20_600),
+            ("/plan/feedback", 20_700),
+        ] {
+            let file = "/ws/src/rosbag2_transport/recorder.cpp";
+            let text = format!("Subscribed to topic '{topic}'");
+            bag.at(log, at, log2("rosbag2_recorder", &text, file));
+            let topic = bag.topic2(topic, "a/msg/A");
+            bag.send(topic, (at, 60_000), 500, &[0, 1, 0, 0, 1]);
+        }
+        for (at, node) in others
+            .iter()
+            .map(|at| (*at, "/other"))
+            .chain([(20_000, "/planner")])
+        {
+            bag.at(events, at, parameters(node, &[("use_sim_time", false)]));
+        }
+        edges(&bag, "found")
+    };
+    assert_eq!(found(&[10_000]), ["/planner > /plan inferred"]);
+    assert!(found(&[19_000]).is_empty());
+}
+
+#[test]
+fn log_texts_that_come_with_the_messages_of_one_topic_show_its_publisher() {
+    let found = |late: i64| {
+        let mut bag = Recording::default();
+        let log = bag.topic2("/rosout", "rcl_interfaces/msg/Log");
+        let [speed, odom] = ["/cmd_vel", "/odom"].map(|topic| bag.topic2(topic, "a/msg/A"));
+        bag.send(odom, (0, 20_000), 200, &[0, 1, 0, 0, 1]);
+        for n in 0..12_u8 {
+            let at = i64::from(n) * 1000 + i64::from(n) * i64::from(n) * 7;
+            bag.at(log, at, log2("walker", &format!("speed -{n}.25"), "w.cpp"));
+            bag.at(speed, at + late, vec![0, 1, 0, 0, n]);
+        }
+        edges(&bag, "beside")
+    };
+    assert_eq!(found(4), ["/walker > /cmd_vel inferred"]);
+    assert!(found(-4).is_empty() && found(80).is_empty());
+}
+
+#[test]
+fn a_service_has_its_clients_and_its_server() {
+    let mut bag = Recording::default();
+    let events = bag.topic2("/add/_service_event", "a/srv/Add_Event");
+    for at in 0..20_u8 {
+        let event = Cdr::default().u8(at % 4).time(SECOND).raw(&[at % 2; 16]);
+        bag.at(events, i64::from(at) * 100, event.u64(1).done());
+    }
+    let expected = [
+        "/add client ? ×2 > /add declared",
+        "/add > /add server ? declared",
+    ];
+    assert_eq!(edges(&bag, "unknown"), expected);
 }
 
 #[test]
@@ -537,37 +602,6 @@ fn a_complete_list_contradicts_rules() {
     let text = "Retrying connection to [127.0.0.1:4] for topic [/tf_static]";
     bag.at(log, 50, log1("/amcl", text, "a.cpp", &["/rosout"]));
     assert_eq!(edges(&bag, "tf_pair"), ["/tf > /amcl inferred"]);
-}
-
-#[test]
-fn a_twin_in_another_namespace_has_the_same_subscriptions() {
-    let mut bag = Recording::default();
-    for robot in ["/r1", "/r2"] {
-        for topic in ["plan", "costmap"] {
-            let node = format!("{robot}/planner");
-            let place = bag.publisher(&node, &format!("{robot}/{topic}"), "nav_msgs/Path");
-            bag.send(place, (0, 5000), 100, &[1; 8]);
-        }
-        let odom = bag.publisher(
-            &format!("{robot}/base"),
-            &format!("{robot}/odom"),
-            "nav_msgs/Odometry",
-        );
-        bag.send(odom, (0, 5000), 100, &[2; 8]);
-    }
-    let log = bag.publisher("/r1/planner", "/rosout", "rosgraph_msgs/Log");
-    let text = "Retrying connection to [127.0.0.1:4] for topic [/r1/odom]";
-    bag.at(
-        log,
-        50,
-        log1(
-            "/r1/planner",
-            text,
-            "p.cpp",
-            &["/rosout", "/r1/plan", "/r1/costmap"],
-        ),
-    );
-    assert_eq!(edges(&bag, "sister"), ["/r2/odom > /r2/planner inferred"]);
 }
 
 #[test]
@@ -971,4 +1005,35 @@ fn an_anonymous_node_of_a_launch_file_is_the_one_of_the_bag() {
     // Without one in the bag, it has the name without its number.
     let (_, names) = launched(NamedElement::Subscribe("/monitor*".to_owned(), topic), seen);
     assert!(names.contains(&"/monitor".to_owned()));
+}
+
+#[test]
+fn a_twin_in_another_namespace_has_the_same_subscriptions() {
+    let mut bag = Recording::default();
+    for robot in ["/r1", "/r2"] {
+        for topic in ["plan", "costmap"] {
+            let node = format!("{robot}/planner");
+            let place = bag.publisher(&node, &format!("{robot}/{topic}"), "nav_msgs/Path");
+            bag.send(place, (0, 5000), 100, &[1; 8]);
+        }
+        let odom = bag.publisher(
+            &format!("{robot}/base"),
+            &format!("{robot}/odom"),
+            "nav_msgs/Odometry",
+        );
+        bag.send(odom, (0, 5000), 100, &[2; 8]);
+    }
+    let log = bag.publisher("/r1/planner", "/rosout", "rosgraph_msgs/Log");
+    let text = "Retrying connection to [127.0.0.1:4] for topic [/r1/odom]";
+    bag.at(
+        log,
+        50,
+        log1(
+            "/r1/planner",
+            text,
+            "p.cpp",
+            &["/rosout", "/r1/plan", "/r1/costmap"],
+        ),
+    );
+    assert_eq!(edges(&bag, "sister"), ["/r2/odom > /r2/planner inferred"]);
 }

@@ -89,6 +89,32 @@ fn a_node_that_declares_its_parameters_again_has_restarted() {
 }
 
 #[test]
+fn a_node_that_declares_its_parameters_after_messages_of_its_own_topic_has_restarted() {
+    let mut bag = Recording::default();
+    let kind = "rcl_interfaces/msg/ParameterEvent";
+    let events = bag.publisher("", "/parameter_events", kind);
+    bag.publishers[events].definition = definition(kind);
+    let path = bag.publisher("", "/nav/path", "std_msgs/msg/Empty");
+    let odom = bag.publisher("", "/odom", "std_msgs/msg/Empty");
+    bag.send(odom, (0, 100_000), 100, &[0, 1, 0, 0]);
+    bag.send(path, (0, 50_000), 100, &[0, 1, 0, 0]);
+    bag.send(path, (60_200, 100_000), 100, &[0, 1, 0, 0]);
+    let start = parameters("/nav", &[("use_sim_time", false)]);
+    bag.messages
+        .push((events, ORIGIN + 60_000 * MILLISECOND, start));
+    bag.messages.sort_by_key(|message| message.1);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let options = mcap::Options {
+        profile: "ros2",
+        ..mcap::Options::default()
+    };
+    fs::write(&path, mcap::write(&bag, &options)).unwrap();
+    let found = restarts(&[path], Stdio::null());
+    assert_eq!(found, ["00:49–01:00  /nav restarted"]);
+}
+
+#[test]
 fn numbers_that_start_over_at_once_are_a_restart() {
     let found = |times: &[(i64, i64)]| {
         let mut bag = minute(&[]);

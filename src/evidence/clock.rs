@@ -6,6 +6,7 @@ use std::io;
 
 use crate::base::budget;
 use crate::base::ids::{ById, grouped};
+use crate::base::name::NodeName;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::GAP_NS;
 use crate::base::time::{Span, Stamp};
@@ -206,8 +207,10 @@ impl ClockOffset {
     }
 }
 
-/// The times of contents that occur once on a topic of a bag, and whether they carry stamps; `None` for those that occur more often.
-type Contents<'a> = BTreeMap<(&'a str, u32), Option<(Stamp, bool)>>;
+/// The times of contents that occur once, by their hashes, and whether they carry stamps; `None` for those that occur more often.
+type Times = BTreeMap<u32, Option<(Stamp, bool)>>;
+/// The contents of a bag, by topic and publisher: two cameras may send the same numbers.
+type Contents<'a> = BTreeMap<(&'a str, Option<&'a str>), Times>;
 
 /// The pairs of bags that have messages in common, each bag with those before it.
 ///
@@ -224,11 +227,14 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
         if stream.latched {
             continue;
         }
-        let contents = &mut bags[stream.bag];
+        let of = &stream.connection;
+        let publisher = of.publisher.as_ref().map(NodeName::as_str);
+        let contents = bags[stream.bag].entry((of.topic.as_str(), publisher));
+        let contents = contents.or_default();
         let stamped = facts.ages.some(at).is_some();
         facts.times.merge(&[*series], |timed| {
-            let key = (stream.connection.topic.as_str(), timed.size);
-            let time = contents.entry(key).or_insert(Some((timed.time, stamped)));
+            let time = contents.entry(timed.size);
+            let time = time.or_insert(Some((timed.time, stamped)));
             *time = time.filter(|(time, _)| *time == timed.time);
         })?;
     }
@@ -293,9 +299,14 @@ pub(crate) fn repeats(
 /// The delay of the common messages in the second recording, their number, and whether both recorded one robot; `None` without
 /// agreement.
 fn offset(one: &Contents<'_>, other: &Contents<'_>) -> Option<(i64, usize, bool)> {
-    let both = other.iter().filter_map(|(key, time)| {
-        let (before, stamped) = (*one.get(key)?)?;
-        Some(((*time)?.0.since(before), key.0, stamped))
+    let both = other
+        .iter()
+        .filter_map(|(key, own)| Some((key.0, one.get(key)?, own)));
+    let both = both.flat_map(|(topic, one, own)| {
+        own.iter().filter_map(move |(hash, time)| {
+            let (before, stamped) = (*one.get(hash)?)?;
+            Some(((*time)?.0.since(before), topic, stamped))
+        })
     });
     let mut lags: Vec<(i64, &str, bool)> = both.collect();
     lags.sort_unstable();
@@ -304,10 +315,9 @@ fn offset(one: &Contents<'_>, other: &Contents<'_>) -> Option<(i64, usize, bool)
     let agreeing = near.clone().count();
     let is_stamped = near.clone().filter(|lag| lag.2).count() >= FEWEST;
     let topics: BTreeSet<&str> = near.map(|lag| lag.1).collect();
-    let is_set = other
-        .values()
-        .flatten()
-        .all(|(time, _)| time.0 > UNSET_DAYS * DAY);
+    let times = [one, other].into_iter().flat_map(BTreeMap::values);
+    let mut times = times.flat_map(BTreeMap::values).flatten();
+    let is_set = times.all(|(time, _)| time.0 > UNSET_DAYS * DAY);
     let is_one_robot = is_set && (is_stamped || topics.len() > TOPICS);
     let is_clear = agreeing >= FEWEST && agreeing * 100 >= lags.len() * SHARE;
     (is_clear && (is_stamped || topics.len() >= TOPICS)).then_some((median, agreeing, is_one_robot))
@@ -423,32 +433,34 @@ mod tests {
     mod offsets {
         use super::super::*;
 
-        fn contents(times: &[i64]) -> Contents<'static> {
-            let keys = (0..).map(|hash| (["/tf", "/odom"][hash as usize % 2], hash));
-            keys.zip(times.iter().map(|t| Some((Stamp(t * 1_000_000), false))))
-                .collect()
+        fn contents(times: &[i64], stamped: bool) -> Contents<'static> {
+            let mut all = Contents::new();
+            for (hash, time) in (0..).zip(times) {
+                let own = all.entry((["/tf", "/odom"][hash as usize % 2], None));
+                let time = Some((Stamp(time * 1_000_000), stamped));
+                own.or_default().insert(hash, time);
+            }
+            all
         }
 
         #[test]
         fn an_offset_needs_messages_that_agree() {
             let one: Vec<i64> = (0..20).map(|n| n * 100).collect();
             let later: Vec<i64> = one.iter().map(|t| t + 350 + t % 7).collect();
-            let (ahead, messages, _) = offset(&contents(&one), &contents(&later)).unwrap();
+            let plain = |times: &[i64]| contents(times, false);
+            let (ahead, messages, _) = offset(&plain(&one), &plain(&later)).unwrap();
             assert_eq!((ahead / 10_000_000, messages), (35, 20));
             let wild: Vec<i64> = one.iter().map(|t| t * 2).collect();
-            assert_eq!(offset(&contents(&one), &contents(&wild)), None);
-            assert_eq!(offset(&contents(&one[..5]), &contents(&later)), None);
-            let only = |mut all: Contents<'static>| {
+            assert_eq!(offset(&plain(&one), &plain(&wild)), None);
+            assert_eq!(offset(&plain(&one[..5]), &plain(&later)), None);
+            let only = |times: &[i64], stamped| {
+                let mut all = contents(times, stamped);
                 all.retain(|key, _| key.0 == "/tf");
                 all
             };
-            assert_eq!(offset(&only(contents(&one)), &only(contents(&later))), None);
-            let stamped = |times| -> Contents<'static> {
-                let all = only(contents(times)).into_iter();
-                all.map(|(key, time)| (key, time.map(|(time, _)| (time, true))))
-                    .collect()
-            };
-            let found = offset(&stamped(&one), &stamped(&later)).unwrap();
+            let found = offset(&only(&one, false), &only(&later, false));
+            assert_eq!(found, None);
+            let found = offset(&only(&one, true), &only(&later, true)).unwrap();
             // In simulated time, which may be another run.
             assert_eq!((found.1, found.2), (10, false));
         }

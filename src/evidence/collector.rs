@@ -10,7 +10,7 @@ use crate::bag::straight::ClockFall;
 use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
 use crate::base::error::{Error, Result};
 use crate::base::ids::ById;
-use crate::base::name::{in_space, is_log};
+use crate::base::name::{in_space, is_log, plain_type};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::clock::{self, Belief, ClockOffset, believed, offsets};
@@ -90,6 +90,8 @@ struct StreamLayout {
     readers: Vec<(SourceId, Read)>,
     /// Whether their headers begin with a number.
     is_numbered: bool,
+    /// Whether their payloads are compared: `/clock` is no copy of anything.
+    is_compared: bool,
     /// Their first header, whose stamp is their age.
     header: Option<FirstHeader>,
     /// The schema for parsing them, if they contain words or numbers that are compared.
@@ -246,8 +248,9 @@ impl Collector {
         // Payloads are compared as long as the budget lasts.
         let beginning = message.data.get(..payload::HEAD).unwrap_or(message.data);
         let cost = beginning.len() as u64 + PAYLOAD_ENTRY;
+        let cost = if layout.is_compared { cost } else { 0 };
         self.compared = self.compared.saturating_add(cost);
-        if self.compared <= self.options.payload_bytes {
+        if layout.is_compared && self.compared <= self.options.payload_bytes {
             // The number in the header is set by the publisher, even in a copy.
             let is_numbered = self.numbers.some(place).is_some();
             let own = beginning.get(if is_numbered { 4 } else { 0 }..);
@@ -404,6 +407,7 @@ impl Sink for BagSink<'_> {
         all.layouts.push(StreamLayout {
             readers,
             is_numbered: schema.numbers_headers(&connection.encoding),
+            is_compared: plain_type(&connection.type_name) != sim_time::CLOCK.type_name,
             header,
             schema: echo::schema(&connection.type_name, &schema).filter(|_| compared),
         });

@@ -106,6 +106,8 @@ observations! {
     Starved(node, topic, policy),
     /// Two nodes have this name.
     Duplicate(node),
+    /// A client with this id calls this service.
+    Calls(service, client),
     /// The recorder lost so many messages of this topic.
     Lost(topic, many),
     /// A snapshot was taken: observations that the source made in an earlier snapshot of the same name and not in this one
@@ -204,6 +206,8 @@ pub(crate) struct Observations {
     /// Simulated times, by the indices of the streams of `/clock`, in milliseconds in place of sizes; and the last one with its bag.
     pub(crate) clocks: ById<usize, Option<SeriesId>>,
     pub(crate) clock: Option<(usize, Stamp)>,
+    /// The last simulated time that was kept, with its stream and the time of its message.
+    ticked: Option<(usize, Stamp, Stamp)>,
     /// The numbers of stamps in simulated time, by the streams' indices.
     pub(crate) simulated: BTreeMap<usize, u32>,
     /// Statistics, in the order in which they were read.
@@ -321,9 +325,18 @@ impl Observations {
         }
     }
 
-    /// Adds a simulated time of the stream at index `place` of a bag.
+    /// Adds a simulated time of the stream at index `place` of a bag; a tick that goes on from one just before shows nothing.
     pub(crate) fn tick(&mut self, (place, bag): (usize, usize), time: Stamp, simulated: Stamp) {
         self.clock = Some((bag, simulated));
+        let is_soon = |to: Stamp, from: Stamp| (0..TICK_NS).contains(&to.since(from));
+        if let Some((at, real, other)) = self.ticked
+            && at == place
+            && is_soon(time, real)
+            && is_soon(simulated, other)
+        {
+            return;
+        }
+        self.ticked = Some((place, time, simulated));
         // Steps are measured modulo 2^32 ms, which is 49 days.
         let millis = simulated.0.div_euclid(1_000_000).rem_euclid(1 << 32);
         let millis = u32::try_from(millis).unwrap_or_default();
@@ -458,6 +471,9 @@ impl Observations {
     }
 }
 
+/// The shortest time between two simulated times that are kept, in nanoseconds: simulators send up to a thousand a second, and
+/// pauses and steps last a second or more.
+const TICK_NS: i64 = 20_000_000;
 /// The number that means an age of 0, in microseconds: clocks may differ either way.
 const AGE_0: i64 = 1 << 31;
 

@@ -133,6 +133,18 @@ impl SourceContext<'_> {
     }
 }
 
+/// Topics that any node may publish, so that one known publisher does not imply that it is the only one.
+pub(crate) const SHARED: [&str; 8] = [
+    "/tf",
+    "/tf_static",
+    "/rosout",
+    "/rosout_agg",
+    "/diagnostics",
+    "/parameter_events",
+    "/statistics",
+    "/clock",
+];
+
 /// A reader of one layout.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Read {

@@ -1,14 +1,15 @@
 //! Publishers that the bag counts but does not name. ROS 2 stores with each topic the number of its
 //! publishers, so a separate box with a question mark represents the remaining ones: `/scan ?`, `/scan ? ×2`.
 //! If only one well-known program publishes messages of the topic's type, the box has its name: `/turtlesim
-//! ?`.
+//! ?`. So do the clients and the server of a service whose events are recorded: `/add client ? ×2`, `/add server ?`.
 //!
 //! Runs after all other sources, since such a box only replaces unknown nodes.
 
+use crate::base::ids::grouped;
 use crate::base::name::is_quiet;
 use crate::base::words::count;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity, verb};
-use crate::evidence::observation::{Confidence, Name};
+use crate::evidence::observation::{Confidence, Name, Observation};
 use crate::evidence::source::contract::Owners;
 use crate::evidence::source_id;
 
@@ -37,17 +38,47 @@ pub(crate) fn conclude(known: &mut Conclusions<'_>) {
             continue;
         }
         let text = known.text(topic);
-        let times = if missing > 1 {
-            format!(" ×{missing}")
-        } else {
-            String::new()
-        };
-        let node = known.facts.name(&format!("{text} ?{times}"));
+        let node = known.facts.name(&format!("{text} ?{}", times(missing)));
         let edge = ElementKey::Publish(node, topic);
         add(known, "unknown", node, edge, &|| {
             let counted = count(offered, "publisher");
             format!("the recording counts {counted} of {text}, but does not name {missing}")
         });
+    }
+    callers(known);
+}
+
+/// Adds the clients and the server of services of which only events are recorded, which do not name them.
+fn callers(known: &mut Conclusions<'_>) {
+    let facts = known.facts.list.iter();
+    let calls = facts.filter_map(|fact| match fact.observation {
+        Observation::Calls(service, client) => Some((service, client)),
+        _ => None,
+    });
+    for (service, clients) in grouped(calls) {
+        let (text, many) = (known.text(service), clients.len());
+        let counted = count(many, "client");
+        let words = || format!("events of {text} show {counted}, but do not name nodes");
+        let ends = [
+            (format!("{text} client ?{}", times(many)), true),
+            (format!("{text} server ?"), false),
+        ];
+        let named = known.publishers(service).chain(known.subscribers(service));
+        let is_free = named.count() == 0;
+        for (name, calls) in ends.into_iter().filter(|_| is_free) {
+            let node = known.facts.name(&name);
+            let edge = ElementKey::edge(calls, node, service);
+            add(known, "unknown", node, edge, &words);
+        }
+    }
+}
+
+/// The end of the name of a box for several nodes.
+fn times(many: usize) -> String {
+    if many > 1 {
+        format!(" ×{many}")
+    } else {
+        String::new()
     }
 }
 

@@ -1,7 +1,7 @@
 //! Reads every bag once and gathers its evidence.
 
 use super::copies::{self, Copies, Rest};
-use super::inputs::{check_named, each_once, in_time, space_of};
+use super::inputs::{affordable, check_named, each_once, in_time, space_of};
 use super::{Reading, Watch};
 use crate::bag::straight::{self, ClockFall, Straightened, Watched};
 use crate::bag::{self, Input, OpenOptions, Report, known_span};
@@ -10,7 +10,7 @@ use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::Span;
 use crate::base::words;
 use crate::evidence::clock;
-use crate::evidence::collector::{self, Collector, Recorded};
+use crate::evidence::collector::{Collector, Recorded};
 use crate::graph::window;
 
 /// The bags of a mission, read.
@@ -192,19 +192,6 @@ fn twice_recorded((many, input): (&u64, &Input)) -> Notice {
 
 /// The beginning of the notice about a clock that was set back.
 const SET_BACK: &str = "the recorder's clock went back by";
-
-/// The collection options without comparing payloads of large bags, where reading all payloads would defeat the index.
-/// They are compared on request.
-fn affordable(reading: &Reading) -> collector::CollectOptions {
-    let mut options = reading.collect.clone();
-    let sizes = reading.inputs.iter().filter_map(bag::size_on_disk);
-    let is_large = sizes.fold(0, u64::saturating_add) > options.payload_bytes;
-    let is_bounded = options.payload_bytes < u64::MAX;
-    if is_bounded && is_large {
-        options.payload_bytes = 0;
-    }
-    options
-}
 
 /// The message for an intact, empty bag.
 pub(super) const NOTHING_RECORDED: &str = "the recording is empty";

@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Reading;
-use super::inputs::{given_offset, in_time, space_of};
+use super::inputs::{affordable, given_offset, in_time, space_of};
 use crate::bag::straight::{Seam, pass};
 use crate::bag::{self, ConnectionId, Input, Message, OpenOptions, Sink};
 use crate::base::error::Result;
@@ -50,33 +50,44 @@ pub(super) fn pairs(
     let space = |bag: usize| space_of(reading, &inputs[bag]);
     let is_one = |pair: &&ClockOffset| pair.is_one_robot && space(pair.bag) == space(pair.other);
     let mut pairs: Vec<ClockOffset> = recorded.offsets.iter().filter(is_one).copied().collect();
-    let spans = spans(recorded);
     let is_unread =
         |at: &usize| !recorded.streams[*at].latched && recorded.facts.payloads.some(*at).is_none();
     let mut common: BTreeSet<[usize; 2]> = BTreeSet::new();
+    let mut unread: BTreeSet<usize> = BTreeSet::new();
     for bags in by_key(recorded).values().filter(|bags| bags.len() > 1) {
-        let unread = bags.iter().filter(|(_, own)| own.iter().any(is_unread));
-        let unread: Vec<usize> = unread.map(|(bag, _)| *bag).collect();
-        for (at, bag) in unread.iter().enumerate() {
-            common.extend(unread[..at].iter().map(|other| [*other, *bag]));
+        let own = bags.iter().filter(|(_, own)| own.iter().any(is_unread));
+        for (bag, _) in own {
+            let others = bags.keys().filter(|other| *other != bag);
+            common.extend(others.map(|other| [*bag.min(other), *bag.max(other)]));
+            unread.insert(*bag);
         }
     }
-    for bags in common {
-        let is_known = pairs.iter().any(|pair| [pair.other, pair.bag] == bags);
-        let [Some(one), Some(other)] = bags.map(|bag| spans.some(bag)) else {
-            continue;
-        };
-        let inputs = bags.map(|bag| &inputs[bag]);
-        let shared = Span::new(one.start.max(other.start), one.end.min(other.end));
-        if !is_known && shared.nanos() > NEAR_NS && !inputs.iter().any(|i| i.is_pipe()) {
-            let sample = sample(reading, &inputs, shared)?;
-            let found = sample.offsets.iter().filter(|pair| pair.is_one_robot);
-            pairs.extend(found.map(|pair| ClockOffset {
-                bag: bags[pair.bag],
-                other: bags[pair.other],
-                ..*pair
-            }));
-        }
+    let is_known = |bags: &[usize; 2]| {
+        let of = |pair: &ClockOffset| [pair.other, pair.bag] == *bags;
+        pairs.iter().any(of) || bags.iter().any(|bag| inputs[*bag].is_pipe())
+    };
+    common.retain(|bags| !is_known(bags));
+    // A bag beside one whose payloads have been read is read whole, of two others the time that they share.
+    let is_small = affordable(reading).payload_bytes > 0;
+    let is_beside = |bags: &[usize; 2]| is_small && !bags.iter().all(|bag| unread.contains(bag));
+    let (beside, apart): (Vec<_>, Vec<_>) = common.into_iter().partition(is_beside);
+    let beside: BTreeSet<usize> = beside.into_iter().flatten().collect();
+    let spans = spans(recorded);
+    let shared = apart.into_iter().filter_map(|[one, other]| {
+        let (first, second) = (spans.some(one)?, spans.some(other)?);
+        let part = Span::new(first.start.max(second.start), first.end.min(second.end));
+        (part.nanos() > NEAR_NS).then(|| (vec![one, other], Some(part)))
+    });
+    let whole = (!beside.is_empty()).then(|| (beside.into_iter().collect(), None));
+    for (bags, part) in whole.into_iter().chain(shared) {
+        let inputs: Vec<&Input> = bags.iter().map(|bag| &inputs[*bag]).collect();
+        let sample = sample(reading, &inputs, part)?;
+        let found = sample.offsets.iter().filter(|pair| pair.is_one_robot);
+        pairs.extend(found.map(|pair| ClockOffset {
+            bag: bags[pair.bag],
+            other: bags[pair.other],
+            ..*pair
+        }));
     }
     pairs.sort_unstable_by_key(|pair| (pair.bag, pair.other));
     Ok(pairs)
@@ -95,10 +106,12 @@ pub(super) fn spans(recorded: &Recorded) -> ById<usize, Option<Span>> {
     spans
 }
 
-/// The messages in the middle of an interval in several bags, compared.
-fn sample(reading: &Reading, inputs: &[&Input], span: Span) -> Result<Recorded> {
-    let from = span.start.plus((span.nanos() - SAMPLE_NS).max(0) / 2);
-    let part = Span::new(from, span.end.min(from.plus(SAMPLE_NS)));
+/// The messages of several bags compared: all, or those in the middle of an interval.
+fn sample(reading: &Reading, inputs: &[&Input], span: Option<Span>) -> Result<Recorded> {
+    let part = span.map(|span| {
+        let from = span.start.plus((span.nanos() - SAMPLE_NS).max(0) / 2);
+        Span::new(from, span.end.min(from.plus(SAMPLE_NS)))
+    });
     let mut collector = Collector::new(CollectOptions {
         payload_bytes: u64::MAX,
         ..CollectOptions::default()
@@ -107,7 +120,7 @@ fn sample(reading: &Reading, inputs: &[&Input], span: Span) -> Result<Recorded> 
         let reader = bag::open(input, &OpenOptions::default())?;
         let mut progress = |_, _| {};
         let mut sink = collector.bag_in(&space_of(reading, input), &mut progress);
-        in_time(reading, input, reader).read(Some(part), &mut sink)?;
+        in_time(reading, input, reader).read(part, &mut sink)?;
     }
     collector.finish()
 }
@@ -192,7 +205,7 @@ pub(super) fn examine(
         let is_both = |s: &Stream| s.bag == bag && both.contains(&s.connection.id);
         clock::repeats((&all.streams, &all.facts), span, is_both).map_err(spool_error)
     };
-    if repeats(recorded, bag)? || repeats(&sample(reading, &[input], span)?, 0)? {
+    if repeats(recorded, bag)? || repeats(&sample(reading, &[input], Some(span))?, 0)? {
         seam.repeated = both;
     }
     Ok(())

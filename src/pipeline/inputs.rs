@@ -10,6 +10,7 @@ use crate::base::error::{Error, Result};
 use crate::base::ids::grouped;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
+use crate::evidence::collector::CollectOptions;
 
 /// Every input once, sorted by name, with a notice for duplicates, which would be counted twice.
 pub(super) fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
@@ -81,6 +82,19 @@ fn is_of(name: &Path, input: &Input) -> bool {
         Input::Path(path) => path.starts_with(name) || path.file_name() == Some(name.as_os_str()),
         Input::Stdin => name == Path::new("-"),
     }
+}
+
+/// The collection options without comparing payloads of large bags, where reading all payloads would defeat the index.
+/// They are compared on request.
+pub(super) fn affordable(reading: &Reading) -> CollectOptions {
+    let mut options = reading.collect.clone();
+    let sizes = reading.inputs.iter().filter_map(bag::size_on_disk);
+    let is_large = sizes.fold(0, u64::saturating_add) > options.payload_bytes;
+    let is_bounded = options.payload_bytes < u64::MAX;
+    if is_bounded && is_large {
+        options.payload_bytes = 0;
+    }
+    options
 }
 
 /// Refuses an offset or a namespace that applies to none of the inputs.

@@ -127,7 +127,7 @@ pub(super) fn read<G: Grammar>(
 ) -> BTreeSet<Compression> {
     let mut walk = Walk::<G>::default();
     let (stop, at) = walk.go(stream, size, false, sink);
-    walk.finish(stop, at, sink)
+    walk.finish(&stop, at, sink)
 }
 
 impl<G: Grammar> Walk<G> {
@@ -175,7 +175,7 @@ impl<G: Grammar> Walk<G> {
     /// Reports what the walk left unread, once it stopped at byte `at`.
     pub(super) fn finish(
         mut self,
-        stop: NoRecord,
+        stop: &NoRecord,
         at: u64,
         sink: &mut dyn Sink,
     ) -> BTreeSet<Compression> {
@@ -190,7 +190,7 @@ impl<G: Grammar> Walk<G> {
         account.unread(found, |text| forward.damage(text));
         let walk = forward.walk;
         let is_cut = !matches!(stop, NoRecord::Io(_));
-        let text = match &stop {
+        let text = match stop {
             NoRecord::End if !G::HAS_END => return self.compression,
             _ if walk.closed && is_cut => return self.compression,
             _ if walk.ended && is_cut => {
@@ -525,7 +525,8 @@ impl Early {
     fn take_back(&mut self, many: u64) {
         for raw in self.last.drain(..).rev().zip(0..many).map(|(raw, _)| raw) {
             let run = self.runs.entry(raw).or_default();
-            (run.stamps.pop(), run.sizes.pop());
+            run.stamps.pop();
+            run.sizes.pop();
         }
     }
 

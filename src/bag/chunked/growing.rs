@@ -78,7 +78,7 @@ impl<G: Grammar> Growing for GrowingChunks<G> {
         let (stop, at) = self.walk.go(&mut stream, 0, !self.is_closed, sink);
         self.at = at;
         if self.is_closed {
-            std::mem::take(&mut self.walk).finish(stop, at, sink);
+            std::mem::take(&mut self.walk).finish(&stop, at, sink);
         }
         self.behind = self
             .last_bytes(&source)

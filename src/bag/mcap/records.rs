@@ -27,7 +27,7 @@ pub(super) const ENTRY: usize = 16;
 pub(super) const FOOTER: u64 = 20;
 pub(super) const DATA_END: u64 = 4;
 /// The number of bytes of statistics before the counts of channels.
-pub(super) const STATISTICS: u64 = 8 + 2 + 4 + 4 + 4 + 4 + 8 + 8;
+pub(super) const STATISTICS: usize = 8 + 2 + 4 + 4 + 4 + 4 + 8 + 8;
 /// The bytes of a record that are inspected for the lengths in it; names are shorter.
 const MOST_LOOKED_AT: usize = 1024;
 /// The first of the record kinds that the format leaves to its users.
@@ -54,8 +54,8 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
     }
     Ok(match kind {
         op::MESSAGE_INDEX => index(stream, len)?,
-        op::STATISTICS if len >= STATISTICS => RecordHead::Total {
-            stated: counts(stream.peek(STATISTICS as usize)?).ok_or(NoRecord::Cut)?,
+        op::STATISTICS if len >= STATISTICS as u64 => RecordHead::Total {
+            stated: counts(stream.peek(STATISTICS)?).ok_or(NoRecord::Cut)?,
             len,
         },
         op::CHUNK_INDEX => listed(stream.peek(24)?, len).ok_or(NoRecord::Cut)?,

@@ -4,9 +4,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use crate::base::name::is_log;
 use crate::base::role::start;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::observation::{Confidence, Name, SourceId};
+use crate::evidence::source::SHARED;
 
 // Bonds: a node that publishes a bond topic (`bond/Status`) also subscribes to it.
 
@@ -76,18 +78,6 @@ pub(crate) fn anonymous(source: SourceId, known: &mut Conclusions<'_>) {
 // The publisher of a topic with messages that name none: if only one node is known to publish it, the messages are from
 // that node. For example, if only `/gps` is known to publish `/fix` from its log, it sent all messages of `/fix`.
 
-/// Topics that any node may publish, so that one known publisher does not imply that it is the only one.
-const SHARED: [&str; 8] = [
-    "/tf",
-    "/tf_static",
-    "/rosout",
-    "/rosout_agg",
-    "/diagnostics",
-    "/parameter_events",
-    "/statistics",
-    "/clock",
-];
-
 pub(crate) fn only_publisher(source: SourceId, known: &mut Conclusions<'_>) {
     for (at, stream) in known.streams.iter().enumerate() {
         if stream.publisher.is_some() || SHARED.contains(&stream.connection.topic.as_str()) {
@@ -153,8 +143,8 @@ fn own_config(source: SourceId, known: &mut Conclusions<'_>, node: Name, topic: 
     }
 }
 
-// Private names: a topic below a node's own full name belongs to the node, so it publishes it if no other
-// publisher is known. For example, `/move_base/status` is by `/move_base`.
+// Private names: a topic below a node's own full name, or of that name, belongs to the node, so it publishes it if no other
+// publisher is known. For example, `/move_base/status` is by `/move_base`, and `/nav/costmap` by the node of that name.
 
 /// Beginnings of the last part of names that others publish: goals for an action, commands for a controller.
 const TAKEN: [&str; 16] = [
@@ -183,16 +173,14 @@ pub(crate) fn private_name(source: SourceId, known: &mut Conclusions<'_>) {
         let name = known.text(topic);
         let last = name.rsplit('/').next().unwrap_or_default();
         let is_taken = TAKEN.iter().any(|taken| last.starts_with(taken));
-        if known.publishers(topic).next().is_some() || is_taken || is_hidden(&name) {
+        let is_other = is_taken || is_hidden(&name) || is_log(&name);
+        if known.publishers(topic).next().is_some() || is_other {
             continue;
         }
         if let Some(node) = owner(&name, &nodes, &spaces) {
             known.infer_publisher(source, node, topic, |known| {
-                format!(
-                    "{} is below the name of {}",
-                    known.text(topic),
-                    known.text(node)
-                )
+                let [topic, node] = [topic, node].map(|name| known.text(name));
+                format!("{topic} is in the private namespace of {node}")
             });
         }
     }
@@ -219,9 +207,10 @@ fn above(name: &str) -> impl Iterator<Item = &str> {
         .filter(|space| !space.is_empty())
 }
 
-/// The node with the longest name above a topic, unless that name is also a namespace of other nodes.
+/// The node of a topic's name, or with the longest name above it, unless that name is also a namespace of other nodes.
 fn owner(topic: &str, nodes: &NodesByName, spaces: &BTreeSet<&str>) -> Option<Name> {
-    let name = above(topic).find(|name| nodes.contains_key(*name))?;
+    let mut names = std::iter::once(topic).chain(above(topic));
+    let name = names.find(|name| nodes.contains_key(*name))?;
     nodes.get(name).copied().filter(|_| !spaces.contains(name))
 }
 
@@ -250,7 +239,7 @@ mod tests {
             assert_eq!(owner("/r1/nav/plan"), Some(Name(2)));
             assert_eq!(owner("/r1/scan"), None);
             assert_eq!(owner("/amcl_pose"), None);
-            assert_eq!(owner("/amcl"), None);
+            assert_eq!(owner("/amcl"), Some(Name(0)));
         }
     }
 }

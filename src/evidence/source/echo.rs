@@ -6,8 +6,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::SourceContext;
-use crate::base::ids::Few;
-use crate::base::name::{in_space, plain_type};
+use crate::base::ids::{Few, grouped};
+use crate::base::name::{in_space, is_log, plain_type};
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::message::cursor::PayloadCursor;
@@ -296,6 +296,82 @@ fn observe(
         let (texts, values) = (echo.texts.len(), echo.values.len());
         format!("{texts} log texts `{before}…{after}` repeat {values} different messages")
     });
+}
+
+// Texts that come with messages. For example, `/walker` logs `speed: 0.2` 24 times, numbers aside, and each time a message of
+// `/cmd_vel`, which has no others, follows within milliseconds: `/walker` publishes it.
+
+/// The longest time between a text and its message, in nanoseconds.
+const BESIDE_NS: i64 = 50_000_000;
+/// The fewest texts of one form that are significant, and the shares, in per cent, of the texts and of the messages that must come
+/// together: 7 topics in public recordings and missions, each of this publisher; with fewer, two timers may agree by chance.
+const FEWEST_BESIDE: usize = 10;
+const SHARES_BESIDE: [usize; 2] = [90, 80];
+
+pub(crate) fn conclude_beside(source: SourceId, known: &mut Conclusions<'_>) {
+    let (said, _) = known.facts.logged.sorted();
+    let of = |text: &LoggedText| Some(((known.owner(&text.logger)?, form(&text.text)), text.time));
+    let mut forms = grouped(said.iter().filter_map(of));
+    forms.retain(|_, texts| texts.len() >= FEWEST_BESIDE);
+    let most = forms.values().map(Vec::len).max().unwrap_or(0);
+    let mut topics: BTreeMap<Name, Vec<Stamp>> = BTreeMap::new();
+    for (at, series) in known.facts.payloads.somes() {
+        let stream = &known.streams[at];
+        let count = known.facts.times.count(*series);
+        if count <= 2 * most as u64 && !is_log(stream.connection.topic.as_str()) {
+            let times = topics.entry(stream.topic).or_default();
+            let all = &known.facts.times;
+            if let Err(error) = all.merge(&[*series], |timed| times.push(timed.time)) {
+                known.failed = Some(error);
+            }
+        }
+    }
+    for times in topics.values_mut() {
+        times.sort_unstable();
+    }
+    for ((node, _), texts) in &forms {
+        let beside = topics.iter();
+        let mut beside =
+            beside.filter_map(|(topic, times)| Some((*topic, beside_of(texts, times)?)));
+        let (Some((topic, is_first)), None) = (beside.next(), beside.next()) else {
+            continue;
+        };
+        if is_first && known.publishers(topic).next().is_none() {
+            known.infer_publisher(source, *node, topic, |known| {
+                let [node, topic] = [*node, topic].map(|name| known.text(name));
+                format!(
+                    "{} log texts of {node} come with messages of {topic}",
+                    texts.len()
+                )
+            });
+        }
+    }
+}
+
+/// A text without its numbers.
+fn form(text: &str) -> String {
+    let words = text.split(|c: char| c.is_ascii_digit() || ".-".contains(c));
+    let words = words.filter(|word| !word.is_empty());
+    words.collect::<Vec<&str>>().join("#")
+}
+
+/// Whether most of the texts come before their messages; `None` if not nearly all texts and messages come together.
+fn beside_of(texts: &[Stamp], times: &[Stamp]) -> Option<bool> {
+    let mut rest = times.iter().peekable();
+    let (mut both, mut first) = (0, 0);
+    for text in texts {
+        while rest
+            .next_if(|time| text.since(**time) > BESIDE_NS)
+            .is_some()
+        {}
+        if let Some(time) = rest.next_if(|time| time.since(*text) <= BESIDE_NS) {
+            both += 1;
+            first += usize::from(time >= text);
+        }
+    }
+    let [of_texts, of_times] = SHARES_BESIDE;
+    let are_most = both * 100 >= texts.len() * of_texts && both * 100 >= times.len() * of_times;
+    are_most.then_some(first * 10 >= both * 9)
 }
 
 #[cfg(test)]

@@ -12,11 +12,11 @@ use super::SourceContext;
 use crate::bag::{Connection, Encoding};
 use crate::base::name::{LOGS, plain_type};
 use crate::base::time::Stamp;
-use crate::evidence::SOURCES;
 use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::message::cursor::PayloadCursor;
 use crate::evidence::message::dynamic::MessageSchema;
 use crate::evidence::observation::{Name, Observation, ObservationRecord, SourceId};
+use crate::evidence::source_id;
 use crate::evidence::spread::Spread;
 use crate::evidence::times::Timed;
 
@@ -175,17 +175,10 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
 
 /// Whether nodes run by simulated time.
 fn is_simulated(known: &Conclusions<'_>) -> bool {
-    let is_clock = |topic: Name| known.kind(topic) == "rosgraph_msgs/Clock";
-    let has_clock = known.streams.iter().any(|s| is_clock(s.topic));
-    let sets = |fact: &ObservationRecord| {
-        SOURCES
-            .get(fact.source)
-            .is_some_and(|s| s.word == "sim_time")
-    };
-    let is_set = |fact: &&ObservationRecord| {
-        matches!(fact.observation, Observation::Subscribe(..)) && sets(fact)
-    };
-    has_clock || known.facts.list.iter().any(|fact| is_set(&fact))
+    let clocks = known.topics_of(|kind| kind == "rosgraph_msgs/Clock");
+    let set = known.observed(source_id("sim_time"));
+    let is_set = |fact: &ObservationRecord| matches!(fact.observation, Observation::Subscribe(..));
+    !clocks.is_empty() || set.iter().any(is_set)
 }
 
 /// The input topic of an output, if only one is possible, and the number of messages with its stamp.

@@ -2,15 +2,18 @@
 //! incompatible quality of service, of Gazebo's plugins, its bridge and rosserial about their endpoints), of two nodes of one name,
 //! and of roscpp about its connections.
 
-use crate::base::name::{is_log, resolved};
-use crate::base::rhythm::{DISCOVERY_NS, FOUND_NS};
+use std::collections::BTreeSet;
+
+use crate::base::name::{is_feedback, is_log, resolved};
+use crate::base::rhythm::{DISCOVERY_NS, FOUND_NS, REGISTRATION_NS};
 use crate::base::time::Stamp;
 use crate::evidence::inference::{
     Conclusions, ElementKey, IncidentKind, Inference, Reliability, Stream, Validity, verb,
 };
 use crate::evidence::message::log::{LogRecord, is_ros1_log};
 use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
-use crate::evidence::source::SourceContext;
+use crate::evidence::source::{SHARED, SourceContext};
+use crate::evidence::source_id;
 
 pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
     // Topics in the logs of a recorder or player belong to other nodes.
@@ -209,10 +212,10 @@ fn found_topic(text: &str) -> Option<&str> {
         .or_else(of_ros2)
 }
 
-/// A topic began when the recorder of all topics found it, and the only node that publishes it was there then.
-pub(crate) fn conclude_births(source: SourceId, known: &mut Conclusions<'_>) {
+/// The topics that a recorder of all topics found when they began, with that time.
+fn births(known: &mut Conclusions<'_>) -> Vec<(Name, Stamp)> {
     let mut found: Vec<(Name, Vec<Stamp>)> = Vec::new();
-    for fact in known.observed(source) {
+    for fact in known.observed(source_id("links")) {
         if let Observation::Appears(topic) = fact.observation {
             found.push((topic, known.times(&fact)));
         }
@@ -237,16 +240,20 @@ pub(crate) fn conclude_births(source: SourceId, known: &mut Conclusions<'_>) {
         .clone()
         .min()
         .is_none_or(|first| !births.clone().any(|time| is_later(*first, &time)));
-    for (topic, times) in found {
-        let (Some(birth), false) = (times.first().copied(), is_list) else {
-            continue;
-        };
+    let start = known.mission.0;
+    let birth = |(topic, times): (Name, Vec<Stamp>)| {
+        let birth = times.first().copied().filter(|_| !is_list)?;
         // A recorder that starts finds what is there in its first seconds.
-        let late = birth.since(known.mission.0);
-        let is_unclear = (FOUND_NS..2 * FOUND_NS).contains(&late);
-        if is_unclear || times.iter().any(|time| is_later(birth, &time)) {
-            continue;
-        }
+        let is_unclear = (FOUND_NS..2 * FOUND_NS).contains(&birth.since(start));
+        let is_once = !times.iter().any(|time| is_later(birth, &time));
+        (is_once && !is_unclear).then_some((topic, birth))
+    };
+    found.into_iter().filter_map(birth).collect()
+}
+
+/// A topic began when the recorder found it, and the only node that publishes it was there then.
+pub(crate) fn conclude_births(source: SourceId, known: &mut Conclusions<'_>) {
+    for (topic, birth) in births(known) {
         let mut streams = known.streams.iter().filter(|stream| stream.topic == topic);
         let node = streams.clone().find_map(|stream| stream.publisher);
         let is_own = |s: &Stream| s.publisher == node && s.trust == Reliability::Whole;
@@ -263,6 +270,35 @@ pub(crate) fn conclude_births(source: SourceId, known: &mut Conclusions<'_>) {
             let inference = Inference::new(source, what, Confidence::Stated, when);
             known.because(inference, Some(birth), |known| {
                 format!("the recorder found {} then", known.text(topic))
+            });
+        }
+    }
+}
+
+// A topic that the recorder finds while a single node starts is of that node. For example, `/teleop` declares its parameters at
+// 101.0 s, the recorder finds `/teleop/cmd_vel` at 101.6 s, and no other node starts then.
+
+pub(crate) fn conclude_found(source: SourceId, known: &mut Conclusions<'_>) {
+    let mut starts: Vec<(Stamp, Name)> = Vec::new();
+    for fact in known.observed(source_id("parameter_events")) {
+        if let Observation::Begins(node) = fact.observation {
+            let times = known.times(&fact).into_iter();
+            starts.extend(times.map(|time| (time, node)));
+        }
+    }
+    let early = known.mission.0.plus(2 * FOUND_NS);
+    for (topic, birth) in births(known).into_iter().filter(|one| one.1 > early) {
+        let near = -REGISTRATION_NS..=DISCOVERY_NS;
+        let near = starts.iter().filter(|s| near.contains(&birth.since(s.0)));
+        let nodes: BTreeSet<Name> = near.map(|(_, node)| *node).collect();
+        let name = known.text(topic);
+        // Feedback is found when its first client starts, since it is sent only then.
+        let is_of_any = is_feedback(&name) || SHARED.contains(&&*name);
+        let is_known = is_of_any || known.publishers(topic).next().is_some();
+        if let (Some(node), 1, false) = (nodes.first(), nodes.len(), is_known) {
+            known.infer_publisher(source, *node, topic, |known| {
+                let node = known.text(*node);
+                format!("the recorder found {name} when {node} started, and no other node")
             });
         }
     }

@@ -44,6 +44,10 @@ pub(crate) fn read(
         context.observation(end, Confidence::Measured, || {
             format!("{service}: {word}, client {client}")
         });
+        if context.stream.publisher.is_none() {
+            let client = context.name(&client);
+            context.states(Observation::Calls(called, client), String::new);
+        }
         let known = Observation::Type(called, kind);
         context.observation(known, Confidence::Measured, String::new);
     }

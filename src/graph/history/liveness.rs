@@ -15,7 +15,7 @@ use crate::evidence::observation::Name;
 use crate::evidence::{Confidence, Evidence, SOURCES, source_word};
 use crate::graph::history::lifetimes::{Extent, Likes, Liveness, LivenessOf, Pulse};
 use crate::graph::history::restarts::{LATCHED, Restart, Restarts};
-use crate::graph::history::senders::{Sender, Senders, Traffic};
+use crate::graph::history::senders::{Sender, Senders, Traffic, stretches};
 use crate::graph::history::{Stretch, begins_steadily};
 
 /// Adds the signs of all evidence to the liveness of its element. Takes the inferences out of the findings, of which
@@ -40,7 +40,7 @@ pub(crate) fn collect(
     let inferences = std::mem::take(&mut findings.inferences);
     let findings = &*findings;
     for inference in inferences {
-        let [node, _] = inference.what.ends();
+        let [node, topic] = inference.what.ends();
         let own = node.map_or(&[][..], |node| restarts.of(node));
         let deaths: Vec<Stamp> = own.iter().map(|r| r.death).collect();
         let liveness = liveness_of.entry(inference.what).or_default();
@@ -61,8 +61,8 @@ pub(crate) fn collect(
                 let place = senders.place(*at).unwrap_or(0);
                 let with = node.and_then(|node| forwarded.get(&(node, stream.topic)));
                 let (with_start, with_end) = with.copied().unwrap_or_default();
-                let topic = stream.connection.topic.as_str();
-                let is_free = is_log(topic) || is_feedback(topic);
+                let name = stream.connection.topic.as_str();
+                let is_free = is_log(name) || is_feedback(name);
                 let what = Followed {
                     known: node.is_none() && sent.contains(at),
                     begins: !is_free && !with_start,
@@ -92,6 +92,16 @@ pub(crate) fn collect(
                 if is_from(&inference, "statistics") {
                     liveness.counted.extend(signs.first());
                 }
+                // A node reports its state in a rhythm as long as it is there.
+                if is_from(&inference, "diagnostics") {
+                    let of = topic.and_then(|topic| traffic.some(topic));
+                    let senders = of.into_iter().flat_map(|of| &of.list);
+                    let until = senders.map(|sender| sender.recording.1).max();
+                    let until = until.unwrap_or(findings.mission.1);
+                    let pulse = Pulse::of(&stretches(signs), own, pauses, until);
+                    liveness.messages().pulses.extend(pulse);
+                    liveness.last_sign = liveness.last_sign.max(signs.last().copied());
+                }
                 if SOURCES.get(inference.source).is_some_and(|s| s.own) {
                     liveness.last_sign = liveness.last_sign.max(signs.last().copied());
                     liveness.speaks = true;
@@ -115,6 +125,12 @@ pub(crate) fn collect(
             Validity::Always => liveness.extent = Extent::Always,
         }
     }
+    add_restarts(&mut liveness_of, restarts);
+    Ok((liveness_of, likes))
+}
+
+/// Adds the ends and the first signs of nodes that restarted.
+fn add_restarts(liveness_of: &mut LivenessOf, restarts: &Restarts) {
     for (node, restarts) in restarts.with_ids() {
         for restart in restarts {
             let liveness = liveness_of.entry(ElementKey::Node(node)).or_default();
@@ -125,7 +141,6 @@ pub(crate) fn collect(
             liveness.ends.push(restart.death);
         }
     }
-    Ok((liveness_of, likes))
 }
 
 /// The publications, as node and topic, that forward the messages of others, and whether they begin and end with

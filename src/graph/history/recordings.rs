@@ -14,34 +14,28 @@ use crate::graph::ById;
 
 /// The first and the last moment of the recording that each bag is a part of, by bag; `None` without messages. A bag is a part of
 /// another's recording if it precedes or follows it and has most topics in common with it.
-#[expect(
-    clippy::type_complexity,
-    reason = "a short-lived list of each bag's time span and names"
-)]
 pub(crate) fn recordings(recorded: &Recorded, streams: &[Stream]) -> Vec<Option<(Stamp, Stamp)>> {
-    let mut bags: Vec<(Option<(Stamp, Stamp)>, BTreeSet<Name>)> = Vec::new();
+    let mut spans: ById<usize, Option<(Stamp, Stamp)>> = ById::default();
+    let mut of_bags: ById<usize, BTreeSet<Name>> = ById::default();
     for stream in streams {
-        if bags.len() <= stream.bag {
-            bags.resize(stream.bag + 1, (None, BTreeSet::new()));
+        let span = spans.grown(stream.bag);
+        if let Some((first, last)) = recorded.messages.bounds(stream.times) {
+            let all = span.get_or_insert((first, last));
+            *all = (all.0.min(first), all.1.max(last));
+            of_bags.grown(stream.bag).insert(stream.topic);
         }
-        let Some(bounds) = recorded.messages.bounds(stream.times) else {
-            continue;
-        };
-        let (span, topics) = &mut bags[stream.bag];
-        let all = span.get_or_insert(bounds);
-        *all = (all.0.min(bounds.0), all.1.max(bounds.1));
-        topics.insert(stream.topic);
     }
     let is_part = |a: usize, b: usize| {
-        let ((Some(one), topics), (Some(other), others)) = (&bags[a], &bags[b]) else {
+        let (Some(one), Some(other)) = (spans[a], spans[b]) else {
             return false;
         };
+        let (topics, others) = (&of_bags[a], &of_bags[b]);
         let shared = one.1.min(other.1).since(one.0.max(other.0));
         let common = topics.intersection(others).count();
         shared <= OUT_OF_ORDER_NS && common * 2 > topics.len().min(others.len())
     };
-    let mut of: Vec<usize> = (0..bags.len()).collect();
-    for a in 0..bags.len() {
+    let mut of: Vec<usize> = (0..spans.len()).collect();
+    for a in 0..spans.len() {
         for b in 0..a {
             if of[a] != of[b] && is_part(a, b) {
                 let (old, new) = (of[a], of[b]);
@@ -51,7 +45,7 @@ pub(crate) fn recordings(recorded: &Recorded, streams: &[Stream]) -> Vec<Option<
         }
     }
     let mut whole: ById<usize, Option<(Stamp, Stamp)>> = ById::default();
-    for ((span, _), one) in bags.iter().zip(&of) {
+    for (span, one) in spans.iter().zip(&of) {
         if let Some((from, to)) = *span {
             let all = whole.grown(*one).get_or_insert((from, to));
             *all = (all.0.min(from), all.1.max(to));

@@ -2,7 +2,6 @@
 //! and silences.
 
 use std::collections::BTreeSet;
-use std::io;
 use std::sync::Arc;
 
 use crate::base::error::Result;
@@ -139,22 +138,16 @@ pub(crate) fn made(
     findings: &mut Findings,
     traffic: &Traffic,
 ) -> Result<History> {
-    of_elements(recorded, findings, traffic).map_err(spool_error)
-}
-
-fn of_elements(
-    recorded: &Recorded,
-    findings: &mut Findings,
-    traffic: &Traffic,
-) -> io::Result<History> {
     let doubled = doubled(recorded, &findings.streams);
-    let restarts = restarts(recorded, findings, traffic, &doubled)?;
-    let simulation = simulation(recorded, traffic)?;
-    let mut pauses = pauses(recorded, traffic, &restarts, &findings.streams)?;
+    let restarts = restarts(recorded, findings, traffic, &doubled).map_err(spool_error)?;
+    let simulation = simulation(recorded, traffic).map_err(spool_error)?;
+    let pauses = pauses(recorded, traffic, &restarts, &findings.streams);
+    let mut pauses = pauses.map_err(spool_error)?;
     pauses.retain(|pause| simulation.pauses().all(|own| own.shared(*pause) <= 0));
     pauses.extend(simulation.pauses());
     pauses.sort_unstable_by_key(|pause| pause.start);
-    let (mut liveness_of, likes) = collect(recorded, findings, traffic, (&restarts, &pauses))?;
+    let all = collect(recorded, findings, traffic, (&restarts, &pauses));
+    let (mut liveness_of, likes) = all.map_err(spool_error)?;
     fall_silent(&mut liveness_of, traffic, findings, &pauses);
     compute_lifetimes(&mut liveness_of, &likes, &restarts, findings.mission);
     let history = assembled(liveness_of, traffic, findings, (pauses, doubled));

@@ -251,7 +251,7 @@ pub(crate) fn restarts(
     let stamped = of_all.filter(|(_, fall)| fall.first.stamp != 0);
     let alike = grouped(stamped.map(|(node, fall)| (fall.header(), (node, fall))));
     let said = said(&findings.inferences);
-    let mut all = declared(&said);
+    let mut all = declared(recorded, &said)?;
     for (node, own) in nodes.with_ids() {
         let is_copy = |fall: &&Fall| {
             let mut alike = alike.get(&fall.header()).into_iter().flatten();
@@ -411,28 +411,35 @@ fn between_records(
     next.into_iter().chain(inside)
 }
 
-/// The starts that nodes of ROS 2 declare after other signs of them, by the source of parameter events.
-fn declared(said: &Few<Name, Vec<&Inference>>) -> Restarts {
+/// The starts that nodes of ROS 2 declare after other signs of them, or messages of their own topics, by the source of parameter
+/// events.
+fn declared(recorded: &Recorded, said: &Few<Name, Vec<&Inference>>) -> io::Result<Restarts> {
     let mut all = Restarts::default();
     for (node, of) in said.with_ids() {
-        // The start in an anonymous name is that of the process.
-        let own = of
-            .iter()
-            .filter(|one| source_word(one.source) != "anonymous");
-        let first = own.flat_map(|one| signs_of(one)).min();
-        let starts = of.iter().filter_map(|one| match &one.when {
-            Validity::Begins { signs, .. } if source_word(one.source) == "parameter_events" => {
-                Some(signs)
+        let mut starts: Vec<Stamp> = Vec::new();
+        let (mut signs, mut sent): (BTreeSet<Stamp>, BTreeSet<Stamp>) = Default::default();
+        for one in of {
+            match (source_word(one.source), &one.when) {
+                ("parameter_events", Validity::Begins { signs, .. }) => starts.extend(signs),
+                ("private_name", Validity::Messages(at)) => {
+                    sent.extend(recorded.messages.times(recorded.streams[*at].times)?);
+                }
+                // The start in an anonymous name is that of the process.
+                ("anonymous", _) => {}
+                _ => signs.extend(signs_of(one)),
             }
-            _ => None,
-        });
-        let mut starts: Vec<Stamp> = starts.flatten().copied().collect();
+        }
         starts.sort_unstable();
-        let mut before = first.copied().unwrap_or(Stamp::MAX);
+        signs.extend(&starts);
+        let mut before = signs.first().copied().unwrap_or(Stamp::MAX);
         for birth in starts {
-            if birth.since(before) > DECLARED_NS {
+            let is_over = |last: &&Stamp| birth.since(**last) > DECLARED_NS;
+            let last = sent.range(..birth).next_back().filter(is_over);
+            if last.is_some() || birth.since(before) > DECLARED_NS {
+                // Only its messages show when it was last there.
+                let last = last.max(signs.range(..birth).next_back().filter(|_| last.is_some()));
                 all.grown(node).push(Restart {
-                    death: birth.plus(-1),
+                    death: last.copied().unwrap_or(birth.plus(-1)),
                     birth,
                     is_proved: false,
                 });
@@ -440,7 +447,7 @@ fn declared(said: &Few<Name, Vec<&Inference>>) -> Restarts {
             before = birth;
         }
     }
-    all
+    Ok(all)
 }
 
 /// All statements about each node.

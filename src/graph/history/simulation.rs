@@ -243,7 +243,9 @@ fn speeds_of_rates(traffic: &Traffic) -> Vec<(Span, f64)> {
             .filter(|s| s.stretches.iter().any(goes_on))
             .count();
         let is_most = alike * 100 >= (many + others) * SPEED_SHARE;
-        if is_most && alike >= SPEED_FEWEST.0 && nodes.len() >= SPEED_FEWEST.1 {
+        // Slow topics show the same step somewhat later.
+        let is_new = at.since(from) >= SPEED_HOLDS_NS;
+        if is_new && is_most && alike >= SPEED_FEWEST.0 && nodes.len() >= SPEED_FEWEST.1 {
             speeds.push((Span::new(from, at), speed));
             (from, speed) = (at, speed * factor);
         }

@@ -267,6 +267,7 @@ fn service_events_prove_their_topic_and_their_service() {
     assert_eq!(
         all,
         [
+            "Calls /add 09090909090909090909090909090909",
             "Topic /add",
             "Topic /add/_service_event",
             "Type /add a/srv/Add"
