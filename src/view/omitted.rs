@@ -116,7 +116,10 @@ pub(crate) fn none_pass(flag: &str, filter: &NameFilter, names: &[&str]) -> Opti
     let is_unfit = !filter.passes_all() && !names.is_empty() && !names.iter().any(passes);
     is_unfit.then(|| {
         Error::usage(
-            format!("`{flag}` matches none of {}", among(names.len())),
+            format!(
+                "`{flag}` matches none of {}",
+                words::count(names.len(), "name")
+            ),
             meant(&filter.wanted(), names),
         )
     })
@@ -183,13 +186,6 @@ fn not_hidden(elements: &Elements, hide: Hide) -> Vec<Notice> {
     unused
         .map(|(word, _)| Notice::new(NoticeKind::Note, text(word)))
         .collect()
-}
-
-fn among(names: usize) -> String {
-    match names {
-        1 => "the only name".to_owned(),
-        n => format!("{n} names"),
-    }
 }
 
 /// The name or namespace nearest to a requested one, else some existing ones.

@@ -36,7 +36,7 @@ GRAPHS = [f"graphs/{name}.json" for name in ("medium", "large", "cyclic", "disco
 DEFECTS = ("uncoloured", "nowhere", "dead", "numbers", "crossed", "heads")
 LIMITS = {
     "recordings": dict(zip(DEFECTS, (0.01, 0.005, 0.0, 0.02, 0.005, 0.04))),
-    "graphs": dict(zip(DEFECTS, (0.35, 0.05, 0.0, 0.6, 0.005, 0.04))),
+    "graphs": dict(zip(DEFECTS, (0.35, 0.05, 0.0, 0.6, 0.005, 0.05))),
 }
 # Topics that every system has; pictures leave them out, or list some as words.
 COMMON = ("tf tf_static diagnostics diagnostics_agg diagnostics_toplevel_state bond rosout rosout_agg clock statistics "

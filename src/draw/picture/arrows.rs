@@ -238,9 +238,10 @@ impl GraphPen<'_> {
         } else {
             self.line(&mut group, track, &look, tip, [true, false]);
         }
-        // A rate that changed is shown even where there is no space beside the line.
+        // A rate that changed is shown even where there is no space beside the line, unless its topic shows it.
+        let is_at_end = ends.into_iter().flatten().any(Shown::has_new_rate);
         if let Some((text, is_badge)) = arrow_label(arrow, shown, ends[0])
-            && (is_badge || track.label.is_some())
+            && (is_badge && !is_at_end || track.label.is_some())
         {
             self.label(&mut over, &text, is_badge, track, shown, &look);
         }

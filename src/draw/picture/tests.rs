@@ -327,41 +327,6 @@ fn a_headline_of_long_names_ends_before_the_clock() {
     }
 }
 
-#[test]
-fn the_number_of_equal_namespaces_is_drawn_over_time() {
-    let robots = |n: usize| -> String {
-        let one = |k: usize| format!("/r{k}/drive>/r{k}/odom@2 /r{k}/plan</r{k}/odom");
-        (1..=n).map(one).collect::<Vec<_>>().join(" ")
-    };
-    let lines = |counts: &[usize]| {
-        let windows: Vec<String> = counts.iter().map(|n| robots(*n)).collect();
-        let windows: Vec<&str> = windows.iter().map(String::as_str).collect();
-        let scenes = scenes(&windows);
-        let member_lists = scenes.iter().map(|scene| {
-            let member_list = scene.groups.iter().find(|group| group.class == "members");
-            let shapes = member_list
-                .into_iter()
-                .flat_map(|member_list| &member_list.pieces);
-            let paths = shapes.filter_map(|piece| match piece {
-                Piece::Shape(shape) => match &shape.form {
-                    Form::Path(steps) => Some(steps.clone()),
-                    _ => None,
-                },
-                Piece::Text(_) => None,
-            });
-            paths.collect::<Vec<_>>()
-        });
-        member_lists.collect::<Vec<_>>()
-    };
-    let reported = lines(&[3, 4, 4]);
-    assert!(reported.iter().all(|paths| paths.len() == 2));
-    // One step up, then constant to the end; equal in every window, where only the playhead moves.
-    assert_eq!(reported[0][0].len(), 4);
-    assert_eq!(reported[0][0], reported[2][0]);
-    assert_ne!(reported[0][1], reported[2][1]);
-    assert!(lines(&[3, 3]).iter().all(Vec::is_empty));
-}
-
 /// The lines of each window between nodes, as their ends with the words of their labels.
 fn bundles(windows: &[&str]) -> Vec<Vec<String>> {
     let options = ViewOptions {
