@@ -90,7 +90,9 @@ fn agree(rounds: usize) {
             fs::write(&path, &changed).unwrap();
             let file = read(&path, Want::Payload);
             // A killed recorder may stop between two records.
-            let is_short = kind == 4 && name.starts_with("front") && Path::new(name).extension().is_some_and(|end| end == "bag");
+            let is_short = kind == 4
+                && name.starts_with("front")
+                && Path::new(name).extension().is_some_and(|end| end == "bag");
             let pipe = (name != "rows.db3").then(|| piped(&changed, &pipe));
             let is_silent = is_silent(&file) || pipe.as_ref().is_some_and(is_silent);
             let differ = match (&file, &pipe) {
