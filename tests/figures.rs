@@ -396,7 +396,10 @@ fn a_figure_that_does_not_fit_is_refused_with_an_alternative() {
     );
     let nothing = figure(&example(), &["--kind", "lives", "--ns-filter", "/nobody"]);
     let said = nothing.err().unwrap_or_default();
-    assert!(said.contains("nothing is left to draw"), "{said}");
+    assert!(
+        said.contains("`--ns-filter` matches none of 36 names"),
+        "{said}"
+    );
 }
 
 #[test]

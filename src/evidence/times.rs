@@ -283,6 +283,11 @@ impl Stamps {
         self.get(id).is_some_and(|s| !s.size_unknown)
     }
 
+    /// The bag that the times of a sequence are of.
+    pub(crate) fn bag_of(&self, id: SeriesId) -> usize {
+        self.get(id).map_or(0, |series| series.bag)
+    }
+
     /// The messages of each bag by day, as they were added and as far as they are in blocks.
     pub(crate) fn calendars(&self) -> &ById<usize, Calendar> {
         &self.calendars
@@ -307,7 +312,7 @@ impl Stamps {
         self.merge(&[id], |timed| early.push((timed.time, timed.size)))?;
         let late = early.split_off(early.partition_point(|(time, _)| *time < at));
         let sized = self.sized(id);
-        let rest = self.series_of(self.get(id).map_or(0, |series| series.bag));
+        let rest = self.series_of(self.bag_of(id));
         self.fill(id, &early, sized)?;
         self.fill(rest, &late, sized)?;
         Ok(rest)

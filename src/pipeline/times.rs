@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::Watch;
 use crate::bag::{Connection, ConnectionId, Reader, Report, Sink, Want};
 use crate::base::error::{Error, Result};
+use crate::base::ids::ById;
 use crate::base::name::{NodeName, TopicName};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::{Span, Stamp};
@@ -71,15 +72,23 @@ impl<'a> MessageTimes<'a> {
         Ok(report)
     }
 
-    /// Sets the messages at incredible times aside, after the last bag; returns what is said of them.
+    /// Sets the messages at incredible times aside, after the last bag; returns what is said of them. Each bag is judged alone,
+    /// since messages of several years may be in one table.
     pub(super) fn finish(&mut self) -> Result<Vec<Notice>> {
         self.stamps.finish().map_err(spool)?;
-        let Some(span) = clock::believed(self.stamps.calendars()).span else {
-            return Ok(Vec::new());
-        };
-        let clips = self.series.iter().map(|id| self.stamps.clip(*id, span));
-        let aside = clips.sum::<std::io::Result<u64>>().map_err(spool)?;
-        Ok(clock::set_aside(self.stamps.calendars(), span, aside).into())
+        let mut said = Vec::new();
+        for (bag, calendar) in self.stamps.calendars().clone().with_ids() {
+            let alone = ById::from(vec![calendar.clone()]);
+            let Some(span) = clock::believed(&alone).span else {
+                continue;
+            };
+            let of_bag = |id: &&SeriesId| self.stamps.bag_of(**id) == bag;
+            let own: Vec<SeriesId> = self.series.iter().filter(of_bag).copied().collect();
+            let clips = own.into_iter().map(|id| self.stamps.clip(id, span));
+            let aside = clips.sum::<std::io::Result<u64>>().map_err(spool)?;
+            said.extend(clock::set_aside(&alone, span, aside));
+        }
+        Ok(said)
     }
 
     /// The time that the messages cover.

@@ -119,7 +119,7 @@ fn a_frame_marks_changes_in_names_classes_and_text() {
     assert!(svg(1).contains("15 → 7 Hz"));
     assert!(svg(1).contains("<g class=\"topic changed active measured\" data-name=\"/image\""));
     assert!(svg(2).contains(
-        "<g class=\"node removed active measured\" data-name=\"/cam\" data-state=\"active\" data-mark=\"removed\" data-entries=\"2\" id=\"n-cam\"><title>/cam&#10;node"
+        "<g class=\"node removed silent declared\" data-name=\"/cam\" data-state=\"silent\" data-mark=\"removed\" data-entries=\"3\" id=\"n-cam\"><title>/cam&#10;node"
     ));
     assert!(svg(2).contains("<g class=\"node added active measured\" data-name=\"/teleop\""));
     assert!(svg(2).contains("data-from=\"/teleop\" data-to=\"/cmd_vel\""));

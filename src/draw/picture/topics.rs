@@ -224,13 +224,13 @@ mod tests {
     #[test]
     fn a_line_has_a_row_per_topic_and_signs_where_it_is_used_both_ways() {
         assert_eq!(words("/a>/n/scan@9 /b</n/scan"), ["scan 9 Hz"]);
-        let both = "/a>/scan@9 /a>/map@1 /b</scan /b</map /b>/odom@5 /a</odom";
+        let both = "/a>/scan@9 /a>/map@0.1 /b</scan /b</map /b>/odom@5 /a</odom";
         assert_eq!(words(both), ["→ scan 9 Hz", "← odom 5 Hz", "→ map 1 msg"]);
     }
 
     #[test]
     fn of_five_topics_the_fastest_is_named() {
-        let four = "/a>/p@1 /a>/q@2 /a>/r@3 /a>/s@4 /b</p /b</q /b</r /b</s";
+        let four = "/a>/p@0.1 /a>/q@2 /a>/r@3 /a>/s@4 /b</p /b</q /b</r /b</s";
         assert_eq!(words(four), ["s 4 Hz", "r 3 Hz", "q 2 Hz", "p 1 msg"]);
         assert_eq!(words(&format!("{four} /a>/t@5 /b</t")), ["t 5 Hz +4"]);
     }
@@ -244,7 +244,7 @@ mod tests {
 
     #[test]
     fn names_are_shortened_while_distinguishable() {
-        let equal = "/a>/n/l/map@1 /a>/n/g/map@2 /b</n/l/map /b</n/g/map";
+        let equal = "/a>/n/l/map@0.1 /a>/n/g/map@2 /b</n/l/map /b</n/g/map";
         assert_eq!(words(equal), ["/n/g/map 2 Hz", "/n/l/map 1 msg"]);
         let image = "/a>/n/camera/image/compressed@30 /b</n/camera/image/compressed";
         assert_eq!(words(image), ["image 30 Hz"]);

@@ -5,6 +5,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
 use crate::base::geometry::{Point, Rect, Size};
+use crate::layout::routes::PORTS;
 use crate::layout::{Outline, Plan, Route};
 
 /// The distance that an edge keeps from other boxes, and at which it turns around their corners: outside that distance, so
@@ -281,7 +282,9 @@ impl Map {
         let (middle, from) = (end.rect.centre(), route.start);
         let own = (end.at, end.at);
         let level = Point::new(middle.x, middle.y + aside);
-        let foot = Point::new(middle.x + aside, middle.y);
+        // From above or below, the side of the box may be shorter.
+        let most = end.rect.w * PORTS / 2.0;
+        let foot = Point::new(middle.x + aside.clamp(-most, most), middle.y);
         let sides = [end.rect.y - LANE, end.rect.bottom() + LANE];
         let mut lanes = sides.map(|y| Point::new(foot.x, y));
         lanes.sort_by(|a, b| (a.y - from.y).abs().total_cmp(&(b.y - from.y).abs()));
