@@ -271,14 +271,12 @@ def compare_table(b, evolution, data):
         assert len(rows) == len(data["graphs"][0]["names"]), len(rows)
         state = {"topic:" + e["name"]: e for e in evolution["windows"][w]["topics"]}
         state |= {"node:" + e["name"]: e for e in evolution["windows"][w]["nodes"]}
-        away = any(e["kind"] == "restarted" for e in evolution["events"])
         for key, rate, shown in rows:
             if key in state and state[key]["hz"] is not None:
                 assert rate == hertz(state[key]["hz"]) + " Hz", (w, key, rate, state[key])
                 assert shown.startswith(state[key]["state"]), (w, key, shown)
             elif key not in state:
-                # A node that is away stays, with its topics.
-                assert rate == "–" and (shown.startswith("absent") or away and shown == "silent"), (w, key, rate, shown)
+                assert rate == "–" and shown.startswith("absent"), (w, key, rate, shown)
     b.keys(ESC, ESC)
     assert b.js("return document.getElementById('sheet').hidden")
     print("  the table agrees with the evolution")

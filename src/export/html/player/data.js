@@ -55,7 +55,8 @@ class Graph {
 		this.dom = new Map(this.els.map((e, i) => [e, i]));
 		// The meaning of a class: its mark, whether the element exists, and the class without marks.
 		this.marks = classes.map(c => KINDS.findIndex(k => c.split(' ').includes(k)));
-		this.there = classes.map((c, k) => k > 0 && this.marks[k] != 1);
+		// What is away is drawn, with its topics and lines, although it does not exist.
+		this.there = classes.map((c, k) => k > 0 && this.marks[k] != 1 && !/ away|^silent declared$/.test(c));
 		this.plain = classes.map(c => c.split(' ').filter((word, k) => !k || /^(stated|inferred|declared|starved|w\d)$/.test(word)).join(' '));
 		this.neighbours = names.map(() => []);
 		arrows.forEach(([a, b], k) => { this.neighbours[a].push(this.N + k); if (a != b) this.neighbours[b].push(this.N + k); });

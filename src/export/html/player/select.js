@@ -82,7 +82,7 @@ const STATES = { active: 'active', silent: 'silent: running, no message in this 
 const DEGREES = { stated: 'stated by a log, graph or file', inferred: 'inferred by a rule', declared: 'declared only' };
 // The facts about an element in some windows, line by line.
 function explain(g, i, [from, to] = range ?? [now, now]) {
-	const isRange = from < to, [state, ...rest] = (isRange ? looksOf(g)[i][0] : g.classes[g.class(i, from)]).split(' '), degree = rest.map(word => DEGREES[word]).find(Boolean) ?? 'measured';
+	const isRange = from < to, look = g.class(i, from), [state, ...rest] = (isRange ? looksOf(g)[i][0] : g.there[look] || g.marks[look] == 1 ? g.classes[look] : 'off').split(' '), degree = rest.map(word => DEGREES[word]).find(Boolean) ?? 'measured';
 	const turn = !isRange && g.rateChange(i, from), rate = g.rate(i, from, to), lifecycle = g.lifecycle(i, to), has = word => rest.includes(word);
 	const now = [has('removed') ? 'ended in this window' : STATES[isRange && state == 'silent' && rate != NIL ? 'active' : state], has('added') && 'began in this window', turn && 'rate ' + turn, rate && (rate == NIL ? state == 'active' && 'no message in this window' : rate + ' in this window'), lifecycle && 'state ' + lifecycle, has('starved') && 'gets nothing (quality of service)', state != 'off' && degree];
 	const text = now.filter(Boolean).join(' · ');
