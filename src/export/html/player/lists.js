@@ -125,6 +125,6 @@ function listSpaces() {
 	} }), ` ${space == '/' ? 'no namespace' : space} (${n})`)));
 }
 // The nodes that are known beside topics; those without a name end with a question mark.
-const knownNodes = isTopicTimeline ? [...whole.kinds.keys()].filter(i => !whole.kinds[i] && !/ \?( ×\d+)?$/.test(whole.names[i])) : NONE;
-$.known.hidden = !knownNodes.length;
-onSeek.push(() => $.known.hidden || fill('knownlist', knownNodes, element));
+const named = isTopicTimeline ? [...whole.kinds.keys()].filter(i => !whole.kinds[i] && !/ \?( ×\d+)?$/.test(whole.names[i])) : NONE;
+$.known.hidden = !named.length;
+onSeek.push(() => $.known.hidden || fill('knownlist', named, element));

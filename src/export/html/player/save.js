@@ -1,11 +1,11 @@
 // Export: a link to exactly this view, and the view as a picture.
 let later;
-const escapes = text => encodeURIComponent(text).replace(/%2F/g, '/').replace(/%3A/g, ':');
+const esc = text => encodeURIComponent(text).replace(/%2F/g, '/').replace(/%3A/g, ':');
 function link() {
 	const parts = { t: starts[now], b: base < 0 ? '' : starts[base], sel: sel >= 0 ? whole.key(sel) : group >= 0 ? folded.key(group) : '', q: $.q.value, table: $.sheet.hidden ? '' : 1, e: range ? ends[range[1]] : '', out: [...without].join(',') };
 	if (range) parts.t = starts[range[0]];
 	const flags = ['bare', 'loop'].filter(flag => new URLSearchParams(location.hash.slice(1)).has(flag)).map(flag => flag + '&').join('');
-	return '#' + flags + Object.entries(parts).filter(([, value]) => value !== '').map(([key, value]) => key + '=' + escapes(value)).join('&');
+	return '#' + flags + Object.entries(parts).filter(([, value]) => value !== '').map(([key, value]) => key + '=' + esc(value)).join('&');
 }
 // Writes the link and the view into the history; a jump to another place is a new entry, so that Back returns to the last one.
 let isLoading = false, isAway = false;
@@ -59,13 +59,13 @@ function picture() {
 	set(copy, { xmlns: 'http://www.w3.org/2000/svg', width: wide, height: high + HEAD, viewBox: [x, y, width, height].join(' ') });
 	const { color, backgroundColor: fill } = getComputedStyle(document.body), most = wide / 6.5;
 	copy.prepend(drawn('style', {}, [...document.querySelectorAll('style')].map(sheet => sheet.textContent).join('')), $.signs.querySelector('defs').cloneNode(true), drawn('rect', { x, y, width, height, fill }));
-	copy.append(drawn('rect', { x, y, width, height: HEAD * unit, fill }), ...[`${missionName} · ${$.where.textContent}`, $.sentence.textContent].map((text, k) =>
+	copy.append(drawn('rect', { x, y, width, height: HEAD * unit, fill }), ...[`${mission} · ${$.where.textContent}`, $.sentence.textContent].map((text, k) =>
 		drawn('text', { x: x + 8 * unit, y: y + (18 + 18 * k) * unit, fill: color, 'font-family': 'Inter', 'font-size': 12 * unit }, text.length > most ? text.slice(0, most) + '…' : text)));
 	copy.querySelectorAll('.off').forEach(e => e.remove());
 	return new XMLSerializer().serializeToString(copy);
 }
-const missionName = document.querySelector('h1').textContent;
-const fileName = kind => `${missionName.replace(/\.\w+$/, '').replace(/[^\w.-]+/g, '_')}_${clock(starts[now]).replace(/:/g, '-')}.${kind}`;
+const mission = document.querySelector('h1').textContent;
+const fileOf = kind => `${mission.replace(/\.\w+$/, '').replace(/[^\w.-]+/g, '_')}_${clock(starts[now]).replace(/:/g, '-')}.${kind}`;
 // An answer beside the list of things to save, for two seconds.
 function tell(text) {
 	const { left, top } = $.save.getBoundingClientRect();
@@ -74,7 +74,7 @@ function tell(text) {
 	setTimeout(() => { $.tip.hidden = true; }, 2000);
 }
 function download(href, kind) {
-	const a = make('a', { href, download: fileName(kind) });
+	const a = make('a', { href, download: fileOf(kind) });
 	a.click();
 	tell(`Saved ${a.download}`);
 }
