@@ -73,10 +73,10 @@ def losses_are_warnings():
         cut = Path(folder) / "cut.bag"
         cut.write_bytes(WAREHOUSE.read_bytes()[:300_000])
         assert 0 < len(bagreel.tables(cut)) < len(bagreel.tables([WAREHOUSE]))
-        (warning,) = seen
-        assert str(warning.message).startswith(f"{cut}: the bag is cut at byte"), warning
-        # It names the line that called the function, through the package's own.
-        assert Path(warning.filename) == Path(__file__), warning.filename
+        texts = [str(warning.message) for warning in seen]
+        assert any(text.startswith(f"{cut}: the bag is cut at byte") for text in texts), texts
+        # They name the line that called the function, through the package's own.
+        assert {Path(warning.filename) for warning in seen} == {Path(__file__)}, seen
 
 
 def missions_are_read():
