@@ -129,7 +129,10 @@ fn a_frame_marks_changes_in_names_classes_and_text() {
         "a topic without a publisher shows its own rate"
     );
     let has_viewer = |k: usize| svg(k).contains("n-viewer\"");
-    assert!(has_viewer(3) && !has_viewer(4), "a ghost stays for one window");
+    assert!(
+        has_viewer(3) && !has_viewer(4),
+        "a ghost stays for one window"
+    );
     assert!(svg(0).contains("window 1 of 5") && svg(0).contains("no change yet"));
 }
 
