@@ -148,12 +148,10 @@ impl Mission {
     /// change by more than the fraction `threshold`, ≥ 0.
     pub fn find_changes(&mut self, threshold: f64) {
         let history = windows::history(&self.elements, &self.graphs);
-        let lives = self.elements.all().map(|what| history.records.of(what));
-        let lives: Vec<_> = lives
-            .map(|record| record.into_iter().flat_map(Record::spans).collect())
-            .collect();
-        for (seen, lives) in self.elements.seen_mut().zip(lives) {
-            seen.lives = lives;
+        let all: Vec<Element> = self.elements.all().collect();
+        for (seen, what) in self.elements.seen_mut().zip(all) {
+            let record = history.records.of(what);
+            seen.lives = record.into_iter().flat_map(Record::spans).collect();
         }
         self.log.events = event_log::make(&event_log::LogInput {
             elements: &self.elements,

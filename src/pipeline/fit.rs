@@ -107,6 +107,16 @@ impl Fitting<'_> {
         Attempt::new(self.mission, self.drawing, options, page, &mut self.layouts)
     }
 
+    /// Takes these options on this page if everything is legible; returns whether it is.
+    fn take_if_readable(&mut self, options: ViewOptions, page: PageOptions) -> bool {
+        let attempt = self.attempt(options, page);
+        let is_readable = attempt.is_readable(self.drawing);
+        if is_readable {
+            self.best = attempt;
+        }
+        is_readable
+    }
+
     /// Takes these options on the page so far.
     fn show(&mut self, options: ViewOptions) {
         self.best = self.attempt(options, self.page().clone());
@@ -184,14 +194,8 @@ impl Fitting<'_> {
     /// Takes the lowest page of a purpose on which the remaining text is legible.
     fn take_lower_page(&mut self) {
         let height = self.page().size.h;
-        let lower = self.sizes().into_iter();
-        for size in lower.take_while(|size| size.h < height) {
-            let attempt = self.attempt(self.options().clone(), self.page_of(size));
-            if attempt.is_readable(self.drawing) {
-                self.best = attempt;
-                return;
-            }
-        }
+        let mut lower = self.sizes().into_iter().take_while(|size| size.h < height);
+        lower.any(|size| self.take_if_readable(self.options().clone(), self.page_of(size)));
     }
 
     /// The pages of the medium, the lowest first.
@@ -337,10 +341,7 @@ impl Fitting<'_> {
         for name in collapsed.iter().rev().take(MOST_REOPENED) {
             let mut opened = self.options().clone();
             opened.collapse.retain(|n| n != name);
-            let attempt = self.attempt(opened, self.page().clone());
-            if attempt.is_readable(self.drawing) {
-                self.best = attempt;
-            }
+            self.take_if_readable(opened, self.page().clone());
         }
     }
 
@@ -351,10 +352,7 @@ impl Fitting<'_> {
                 counts_rows: false,
                 ..self.options().clone()
             };
-            let attempt = self.attempt(options, self.page().clone());
-            if attempt.is_readable(self.drawing) {
-                self.best = attempt;
-            }
+            self.take_if_readable(options, self.page().clone());
         }
     }
 

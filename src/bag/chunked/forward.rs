@@ -34,6 +34,8 @@ struct Early {
 struct EarlyRun {
     stamps: Vec<Stamp>,
     sizes: Vec<u32>,
+    /// The number of those of the last chunk.
+    last: u64,
 }
 
 /// The most early messages that are kept: 3 MB.
@@ -523,16 +525,20 @@ impl<G: Grammar> io::Read for BeforeChunk<'_, '_, G> {
 impl Early {
     /// Drops as many messages of the last chunk, since its index has them under other numbers.
     fn take_back(&mut self, many: u64) {
-        for raw in self.last.drain(..).rev().zip(0..many).map(|(raw, _)| raw) {
-            let run = self.runs.entry(raw).or_default();
-            run.stamps.pop();
-            run.sizes.pop();
+        for (raw, behind) in self.last.drain(..).rev().zip(0..) {
+            if let Some(run) = self.runs.get_mut(&raw) {
+                run.last = 0;
+                if behind < many {
+                    run.stamps.pop();
+                    run.sizes.pop();
+                }
+            }
         }
     }
 
     /// Takes an index record of the last chunk; returns the number of messages that the chunk lacks.
     fn index(&mut self, raw: u32, count: u64, stamps: &[Stamp]) -> u64 {
-        let found = self.last.iter().filter(|own| **own == raw).count() as u64;
+        let found = self.runs.get(&raw).map_or(0, |run| run.last);
         if found == 0 && self.held < MOST_EARLY {
             self.held += stamps.len();
             self.runs.entry(raw).or_default().stamps.extend(stamps);
@@ -546,5 +552,6 @@ impl Early {
         let run = self.runs.entry(raw).or_default();
         run.stamps.push(time);
         run.sizes.push(size);
+        run.last += 1;
     }
 }

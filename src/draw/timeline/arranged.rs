@@ -49,6 +49,11 @@ pub(crate) fn by_namespace(rows: Vec<Row>, whole: Span, is_folded: bool) -> Vec<
     spaces.sort_by_key(|(space, own)| (space != "/", start(own)));
     // If all names are at the root, a title says nothing.
     let is_flat = spaces.len() == 1 && spaces[0].0 == "/";
+    let level = if is_flat {
+        Level::Outside
+    } else {
+        Level::Inside
+    };
     let mut all = Vec::new();
     for (space, mut own) in spaces {
         if let [only] = &mut own[..] {
@@ -57,9 +62,7 @@ pub(crate) fn by_namespace(rows: Vec<Row>, whole: Span, is_folded: bool) -> Vec<
             continue;
         }
         for row in &mut own {
-            if !is_flat {
-                row.level = Level::Inside;
-            }
+            row.level = level;
             row.labels = vec![last_part(&row.name).to_owned()];
         }
         if !is_flat {

@@ -357,6 +357,15 @@ fn form(text: &str) -> String {
 
 /// Whether most of the texts come before their messages; `None` if not nearly all texts and messages come together.
 fn beside_of(texts: &[Stamp], times: &[Stamp]) -> Option<bool> {
+    let are_most = |both: usize| {
+        let shares = [texts, times].into_iter().zip(SHARES_BESIDE);
+        shares
+            .clone()
+            .all(|(all, share)| both * 100 >= all.len() * share)
+    };
+    if !are_most(texts.len().min(times.len())) {
+        return None;
+    }
     let mut rest = times.iter().peekable();
     let (mut both, mut first) = (0, 0);
     for text in texts {
@@ -369,9 +378,7 @@ fn beside_of(texts: &[Stamp], times: &[Stamp]) -> Option<bool> {
             first += usize::from(time >= text);
         }
     }
-    let [of_texts, of_times] = SHARES_BESIDE;
-    let are_most = both * 100 >= texts.len() * of_texts && both * 100 >= times.len() * of_times;
-    are_most.then_some(first * 10 >= both * 9)
+    are_most(both).then_some(first * 10 >= both * 9)
 }
 
 #[cfg(test)]

@@ -123,7 +123,7 @@ impl PageChanges {
             let (text, id) = (line.words.clone(), Some(headline.event));
             Some(ChangeLine(at, sign, place, text, id, when))
         };
-        let interrupted = |frame: &Frame| {
+        let interruptions = |frame: &Frame| {
             let all = mission.log.interruptions.iter();
             let inside = all.filter(|one| frame.span.contains(one.time));
             let line = inside.map(|one| {
@@ -144,7 +144,7 @@ impl PageChanges {
             }
             let headlines = frame.headlines.iter().take(MOST_REPORTED);
             let headlines = headlines.filter_map(|headline| line(frame, headline));
-            let lines = interrupted(frame).into_iter().chain(headlines);
+            let lines = interruptions(frame).into_iter().chain(headlines);
             ChangedWindow(
                 at,
                 frame.counts.total(),

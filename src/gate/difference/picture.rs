@@ -107,15 +107,15 @@ fn side_of(mission: &Mission) -> MissionSide {
         };
         side.insert(Key::Topic(name), topic);
     }
-    let edges = side.keys().filter(|key| match key {
-        Key::Publish(node, _) | Key::Subscribe(_, node) => {
-            !side.contains_key(&Key::Node(node.clone()))
-        }
-        Key::Node(_) | Key::Topic(_) => false,
+    let nodes: BTreeSet<Key> = side
+        .keys()
+        .filter(|k| matches!(k, Key::Node(_)))
+        .cloned()
+        .collect();
+    side.retain(|key, _| match key {
+        Key::Publish(node, _) | Key::Subscribe(_, node) => nodes.contains(&Key::Node(node.clone())),
+        Key::Node(_) | Key::Topic(_) => true,
     });
-    for edge in edges.cloned().collect::<Vec<Key>>() {
-        side.remove(&edge);
-    }
     side
 }
 
@@ -129,25 +129,21 @@ pub(crate) fn union(
     let (a, b) = (side_of(first), side_of(second));
     let elements = elements(&a, &b);
     let span = |from: i64| Span::new(Stamp(from), Stamp(from + SECOND));
-    let window = |index: usize, span: Span, seen: &MissionSide| Window {
+    let shown = match side {
+        Side::Each => vec![(span(0), &a), (span(SECOND), &b)],
+        Side::Both => vec![(span(SECOND), &b)],
+    };
+    let window = |(index, (span, seen)): (usize, &(Span, &MissionSide))| Window {
         index,
-        span,
+        span: *span,
         partial: false,
         messages: seen.values().filter_map(|known| known.count).sum(),
         changes: Vec::new(),
         events: Vec::new(),
     };
-    let shown = match side {
-        Side::Each => vec![(span(0), &a), (span(SECOND), &b)],
-        Side::Both => vec![(span(SECOND), &b)],
-    };
-    let windows = shown.iter().enumerate();
-    let windows: Vec<Window> = windows
-        .map(|(at, (span, seen))| window(at, *span, seen))
-        .collect();
-    let graphs = shown
-        .iter()
-        .map(|(span, seen)| (*span, graph(&elements, seen)));
+    let windows: Vec<Window> = shown.iter().enumerate().map(window).collect();
+    let graphs = shown.iter();
+    let graphs = graphs.map(|(span, seen)| (*span, graph(&elements, seen)));
     let graphs = graphs.collect();
     let start = windows.first().map_or(AT, |w| w.span.start);
     let events = UnionLog {
@@ -262,12 +258,9 @@ type Turned<'a> = BTreeMap<(&'static str, &'a str), bool>;
 
 /// The elements in only one mission that would be observable in the other.
 fn turned(differing: &[Difference]) -> Turned<'_> {
-    let known = differing
-        .iter()
-        .filter(|d| d.is_known && d.side != Where::Both);
-    known
-        .map(|d| ((d.kind, d.name.as_str()), d.side == Where::Second))
-        .collect()
+    let known = (differing.iter()).filter(|d| d.is_known && d.side != Where::Both);
+    let sides = known.map(|d| ((d.kind, d.name.as_str()), d.side == Where::Second));
+    sides.collect()
 }
 
 impl UnionLog<'_> {
@@ -421,22 +414,15 @@ pub(crate) fn pairs(
             let subjects = [("A", &subject.first), ("B", &subject.second)];
             for ((row, mission), (side, subject)) in pair.into_iter().zip(missions).zip(subjects) {
                 let hz = row.hz.unwrap_or(0.0);
+                let share = if most > 0.0 { hz / most } else { 1.0 };
+                let node = drawn.elements.node(&name).filter(|_| !is_topic);
                 rows.push(Row {
                     labels: vec![format!("{side} {subject}")],
                     level: Level::Inside,
-                    nodes: drawn
-                        .elements
-                        .node(&name)
-                        .filter(|_| !is_topic)
-                        .into_iter()
-                        .collect(),
+                    nodes: node.into_iter().collect(),
                     marks: Vec::new(),
                     topic: drawn.elements.topic(&name).filter(|_| is_topic),
-                    ..moved(
-                        row,
-                        mission.span.start,
-                        if most > 0.0 { hz / most } else { 1.0 },
-                    )
+                    ..moved(row, mission.span.start, share)
                 });
             }
         }

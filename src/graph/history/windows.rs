@@ -16,10 +16,8 @@ use crate::graph::{ById, Element, Elements, Graphs, PerElement, State};
 pub(crate) fn history(elements: &Elements, graphs: &Graphs) -> History {
     let confidences = graphs.confidences(elements);
     let record = |what| {
-        let confidence = confidences
-            .of(what)
-            .copied()
-            .unwrap_or(Confidence::Declared);
+        let known = confidences.of(what).copied();
+        let confidence = known.unwrap_or(Confidence::Declared);
         Record::of_lives(confidence, lives(what, graphs))
     };
     History {

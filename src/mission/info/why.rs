@@ -198,14 +198,20 @@ fn happened(mission: &Mission, element: Element, pieces: &[EvidenceLine]) -> Vec
         let is_end = event.part_of.is_none() && [node, topic].contains(&Some(element));
         (event.what == element || is_end) && !event.quiet
     };
-    let mut lines = Vec::new();
     let mut shown = BTreeSet::new();
+    let mut rows = Vec::new();
+    let mut own = Vec::new();
     for (id, event) in events.with_ids().filter(|(_, event)| is_own(event)) {
         let head = event.part_of.unwrap_or(id);
-        if let Some(whole) = events.get(head).filter(|_| shown.insert(head)) {
-            let rows = row_lines(mission, &[LogRow::Event(head, whole)], LogFormat::Text);
-            lines.extend(rows.iter().map(|row| row.text(None).trim_end().to_owned()));
-        }
+        let whole = events.get(head).filter(|_| shown.insert(head));
+        rows.extend(whole.map(|whole| LogRow::Event(head, whole)));
+        own.push((event, whole.is_some()));
+    }
+    let mut heads = row_lines(mission, &rows, LogFormat::Text).into_iter();
+    let mut lines = Vec::new();
+    for (event, is_first) in own {
+        let head = if is_first { heads.next() } else { None };
+        lines.extend(head.map(|head| head.text(None).trim_end().to_owned()));
         if let (Element::Node(id), Kind::Stopped | Kind::Restarted) = (event.what, event.kind) {
             let name = elements.nodes[id].name.as_str();
             lines.extend(logged(mission, name, event.time, pieces));
