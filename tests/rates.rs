@@ -95,6 +95,21 @@ fn numbers(folder: &Path, bag: &str) -> Vec<(String, Option<f64>, Option<f64>)> 
 }
 
 #[test]
+fn a_few_messages_have_no_rate() {
+    let rate = |messages: i64| {
+        let mut bag = bursts(&[], &[]);
+        bag.send(1, (60_000, 60_000 + 9 * messages), 9, &[]);
+        let dir = tempfile::tempdir().unwrap();
+        let bytes = mcap::write(&bag, &mcap::Options::default());
+        fs::write(dir.path().join("r.mcap"), bytes).unwrap();
+        let all = numbers(dir.path(), "r.mcap");
+        all.into_iter().find(|one| one.0 == "/cmd_vel").unwrap().1
+    };
+    assert_eq!(rate(4), None);
+    assert!(rate(5).unwrap() > 100.0);
+}
+
+#[test]
 fn a_topic_has_one_rate_while_sending_in_every_output() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();

@@ -29,6 +29,17 @@ fn a_latched_message_that_may_be_a_repetition_is_no_start() {
 }
 
 #[test]
+fn a_latched_topic_that_is_sent_all_the_time_is_a_topic_like_any_other() {
+    let text = |step: usize| latched((0..25).chain(45..60).step_by(step));
+    assert!(
+        text(1).contains("/map_server silent for 21 s"),
+        "{}",
+        text(1)
+    );
+    assert_eq!(text(3), "");
+}
+
+#[test]
 fn a_first_message_within_its_period_is_no_beginning() {
     let text = |late: i64| {
         let mut bag = minute(&[]);

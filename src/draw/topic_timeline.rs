@@ -170,10 +170,10 @@ impl<'a> TopicTimeline<'a> {
             let rate = if is_window {
                 count(row).map(|count| words::rate_of(count, seconds))
             } else {
-                row.rates()
+                Some(row.rates())
             };
-            let rate = rate.as_deref().map(|rate| (rate, ink::TEXT));
-            let (text, color) = rate.unwrap_or(("–", ink::QUIET));
+            let rate = rate.as_deref();
+            let (text, color) = rate.map_or(("–", ink::QUIET), |rate| (rate, ink::TEXT));
             self.drawer.rate(&mut canvas, self.drawer.y(k), text, color);
         }
         canvas.begin("nodes");

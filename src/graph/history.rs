@@ -175,6 +175,12 @@ impl Sending {
         &self.senders[from..to]
     }
 
+    /// The number of messages of some senders.
+    pub(crate) fn count<'a>(senders: impl Iterator<Item = &'a Sender>) -> u64 {
+        let stretches = senders.flat_map(|sender| &sender.stretches);
+        stretches.fold(0, |n, stretch| n.saturating_add(stretch.count))
+    }
+
     /// The time of the first message of some senders, and that of the last.
     pub(crate) fn bounds<'a>(senders: impl Iterator<Item = &'a Sender>) -> Option<(Stamp, Stamp)> {
         let stretches = senders.flat_map(|sender| &sender.stretches);

@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use super::Mission;
 use super::event_log::Kind;
+use crate::base::rhythm::FEWEST;
 use crate::base::time::{Span, Stamp};
-use crate::graph::history::{Sender, Stretch};
+use crate::graph::history::{Sender, Sending, Stretch};
 use crate::graph::{ById, EdgeId, Element, NodeId, TopicId};
 
 /// The length above which a silence visibly interrupts a rate: in nanoseconds, and as a fraction of the
@@ -124,20 +125,22 @@ impl<'a> Rates<'a> {
         summed(&rates, self.mission.span)
     }
 
-    /// The mean rate of some senders together while they send: their pauses are left out. `None` without two messages.
+    /// The mean rate of some senders together while they send: their pauses are left out. `None` with fewer messages than
+    /// show a rhythm: four within 35 ms are not 113 Hz.
     pub(crate) fn while_sending(&self, senders: &[&Sender]) -> Option<f64> {
+        let count = Sending::count(senders.iter().copied());
+        if count < FEWEST {
+            return None;
+        }
         if let [_] = senders {
             return mean(&self.of(senders));
         }
         // Several that rarely send have no rates of their own, so their messages are counted.
-        let stretches = || senders.iter().flat_map(|sender| &sender.stretches);
-        let spans = stretches().map(|s| Span::new(s.first, s.last.plus(1)));
+        let stretches = senders.iter().flat_map(|sender| &sender.stretches);
+        let spans = stretches.map(|s| Span::new(s.first, s.last.plus(1)));
         let spans = Span::joined(spans.collect(), silence(self.mission.span));
         let nanos: i64 = spans.iter().map(|span| span.nanos() - 1).sum();
-        let intervals = stretches()
-            .map(|s| s.count)
-            .sum::<u64>()
-            .checked_sub(spans.len() as u64)?;
+        let intervals = count.checked_sub(spans.len() as u64)?;
         (nanos > 1_000_000 && intervals > 0).then(|| intervals as f64 * 1e9 / nanos as f64)
     }
 

@@ -1,11 +1,12 @@
 //! The order of rows: by namespace, as a staircase of beginnings; or joined, a row for all that begin and end together.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::marks::{RowMark, Sign};
 use super::rows::{Level, Row, SendingBar};
 use super::source::FigureSource;
+use crate::base::ids::grouped;
 use crate::base::name::{ShortNames, last_part, namespace};
 use crate::base::time::Span;
 use crate::base::words;
@@ -39,21 +40,13 @@ pub(crate) fn by_namespace(rows: Vec<Row>, whole: Span, is_folded: bool) -> Vec<
         !is_marked && !is_giver && is_throughout(row, whole)
     };
     let many = rows.len();
-    let mut spaces: BTreeMap<String, Vec<Row>> = BTreeMap::new();
-    for row in rows {
-        let space = namespace(&row.name).to_owned();
-        spaces.entry(space).or_default().push(row);
-    }
+    let rows = rows.into_iter();
+    let spaces = grouped(rows.map(|row| (namespace(&row.name).to_owned(), row)));
     let mut spaces: Vec<(String, Vec<Row>)> = spaces.into_iter().collect();
     let start = |own: &[Row]| own.iter().map(Row::start).min();
     spaces.sort_by_key(|(space, own)| (space != "/", start(own)));
-    // If all names are at the root, a title says nothing.
-    let is_flat = spaces.len() == 1 && spaces[0].0 == "/";
-    let level = if is_flat {
-        Level::Outside
-    } else {
-        Level::Inside
-    };
+    // If all others are written with their namespaces, a title of those at the root says nothing.
+    let is_flat = (spaces.iter()).all(|(space, own)| space == "/" || own.len() == 1);
     let mut all = Vec::new();
     for (space, mut own) in spaces {
         if let [only] = &mut own[..] {
@@ -62,7 +55,9 @@ pub(crate) fn by_namespace(rows: Vec<Row>, whole: Span, is_folded: bool) -> Vec<
             continue;
         }
         for row in &mut own {
-            row.level = level;
+            if !is_flat {
+                row.level = Level::Inside;
+            }
             row.labels = vec![last_part(&row.name).to_owned()];
         }
         if !is_flat {

@@ -207,7 +207,7 @@ impl Drawer {
         };
         if density == Density::Page {
             let width = |text: String| canvas.width(&text, Type::Small) + 1.4;
-            let written = timeline.rows.iter().filter_map(Row::rates);
+            let written = timeline.rows.iter().map(Row::rates);
             rates = written.map(width).fold(rates, f64::max);
             let types = timeline.rows.iter().map(|row| row.beside[1].join(", "));
             beside = types.map(width).fold(0.0, f64::max).min(beside);

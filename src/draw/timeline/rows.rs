@@ -10,7 +10,7 @@ use crate::base::name::namespace;
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::Confidence;
-use crate::graph::history::Sender;
+use crate::graph::history::{Sender, Sending};
 use crate::graph::{ById, EdgeId, Element, NodeId, TopicId};
 use crate::mission::rates::{Piece, Rates, silence, steps};
 
@@ -55,8 +55,10 @@ pub(crate) struct Row {
     pub(crate) is_inferred: bool,
     /// The times in which it publishes.
     pub(crate) bars: Vec<SendingBar>,
-    /// Messages per second while it publishes; `None` if it never does, or if that is unknown.
+    /// Messages per second while it publishes; `None` if it never does, or too rarely for a rate.
     pub(crate) hz: Option<f64>,
+    /// The number of messages that it publishes.
+    pub(crate) count: u64,
     /// Its rates in order, if there are several.
     pub(crate) steps: Vec<f64>,
     /// Its events, in order of the log.
@@ -86,11 +88,12 @@ impl Row {
         self.lives.iter().any(shared)
     }
 
-    /// Its rates while it publishes, in words: `10 → 5 → 10 Hz`.
-    pub(crate) fn rates(&self) -> Option<String> {
-        match &self.steps[..] {
-            [] => self.hz.map(words::rate),
-            steps => Some(words::rates(steps)),
+    /// Its rates while it publishes, in words: `10 → 5 → 10 Hz`; without one, the number of its messages.
+    pub(crate) fn rates(&self) -> String {
+        match (&self.steps[..], self.hz) {
+            ([], Some(hz)) => words::rate(hz),
+            ([], None) => words::rate_of(self.count, 0.0),
+            (steps, _) => words::rates(steps),
         }
     }
 
@@ -189,7 +192,8 @@ fn row(
         is_inferred: senders.is_empty() && confidence.is_some_and(|c| c >= Confidence::Inferred),
         bars,
         hz,
-        steps: steps(&pieces),
+        count: Sending::count(senders.iter().copied()),
+        steps: hz.map_or(Vec::new(), |_| steps(&pieces)),
         ..Row::default()
     }
 }

@@ -14,7 +14,7 @@ use crate::evidence::inference::{ElementKey, Inference, Reliability, Validity};
 use crate::evidence::observation::Name;
 use crate::evidence::{Confidence, Evidence, SOURCES, source_word};
 use crate::graph::history::lifetimes::{Extent, Likes, Liveness, LivenessOf, Pulse};
-use crate::graph::history::restarts::{LATCHED, Restart, Restarts};
+use crate::graph::history::restarts::{Restart, Restarts};
 use crate::graph::history::senders::{Sender, Senders, Traffic, stretches};
 use crate::graph::history::{Stretch, begins_steadily};
 
@@ -282,11 +282,9 @@ fn follow(liveness: &mut Liveness, senders: &Senders, place: usize, what: &Follo
         liveness.extent = liveness.extent.max(Extent::Whole);
         return;
     };
-    let count: u64 = sender.stretches.iter().map(|s| s.count).sum();
-    let latched = sender.latched && count <= LATCHED;
     let messages = liveness.messages();
     messages.senders.0 += 1;
-    messages.senders.1 += u32::from(latched);
+    messages.senders.1 += u32::from(sender.latched);
     if what.known {
         liveness.seen.extend([first, last]);
         return;
@@ -298,7 +296,7 @@ fn follow(liveness: &mut Liveness, senders: &Senders, place: usize, what: &Follo
     let due = sender.recording.0.plus(FOUND_NS.saturating_add(period));
     let answers = |asked: Stamp| (0..=CROWD_NS).contains(&first.since(asked));
     let is_proof = what.begins && first > due && !what.asked.is_some_and(answers);
-    if is_proof && (latched || begins_steadily(&sender.stretches)) {
+    if is_proof && (sender.latched || begins_steadily(&sender.stretches)) {
         liveness.begins.push(first);
     }
     liveness.last_sign = liveness.last_sign.max(Some(last));
@@ -311,7 +309,7 @@ fn follow(liveness: &mut Liveness, senders: &Senders, place: usize, what: &Follo
         what.pauses,
         sender.recording.1,
     );
-    let pulse = pulse.filter(|_| what.beats && !latched);
+    let pulse = pulse.filter(|_| what.beats && !sender.latched);
     messages.pulses.extend(pulse);
 }
 

@@ -39,9 +39,6 @@ impl Restart {
 /// Restarts by node, sorted by time.
 pub(crate) type Restarts = Few<Name, Vec<Restart>>;
 
-/// The most messages of a latched topic: one with more is sent again all the time, so that a repetition shows nothing.
-/// A map is sent once per start; with more, parameters that are republished every few seconds would be restarts.
-pub(super) const LATCHED: u64 = 20;
 /// The most gaps, of all nodes together, around which numbers are requested: each requires reading two
 /// chunks, so that so many take a second. Missions have a few dozen gaps.
 const MOST_ASKED: usize = 256;
@@ -484,11 +481,8 @@ fn sent_again(recorded: &Recorded, own: &[Own<'_>]) -> io::Result<Vec<(Stamp, St
     }
     let latched = own.iter().filter(|own| own.sender.latched);
     for at in latched.flat_map(|own| &own.streams) {
-        let latched = recorded.streams[*at].times;
-        if !(2..=LATCHED).contains(&recorded.messages.count(latched)) {
-            continue;
-        }
-        for again in recorded.messages.times(latched)?.into_iter().skip(1) {
+        let times = recorded.messages.times(recorded.streams[*at].times)?;
+        for again in times.into_iter().skip(1) {
             let silences: Option<Vec<Stamp>> = rhythms().map(|r| silent_since(r, again)).collect();
             let since = silences.and_then(|s| s.into_iter().max());
             found.extend(since.map(|since| (since, again)));

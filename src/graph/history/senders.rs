@@ -53,6 +53,7 @@ impl Senders {
 pub(crate) struct Sender {
     /// The node; `None` for all unknown senders together.
     pub(crate) node: Option<Name>,
+    /// Whether its last message keeps its meaning: it is latched, and is not sent all the time.
     pub(crate) latched: bool,
     pub(crate) stretches: Vec<Stretch>,
     /// The first and the last moment of its recordings.
@@ -101,7 +102,7 @@ fn senders(
     let of_topic: Vec<&Stream> = streams.iter().map(|at| &findings.streams[*at]).collect();
     let ids: Vec<_> = of_topic.iter().map(|stream| stream.times).collect();
     let mut traces: Vec<Option<(Stamp, Stamp)>> = vec![None; streams.len()];
-    let (of, mut received) = places(&of_topic, recordings);
+    let (of, mut received) = places(recorded, &of_topic, recordings);
     let mut pauses = LongestPauses::default();
     recorded.messages.merge(&ids, |timed| {
         let trace = &mut traces[timed.series];
@@ -177,8 +178,14 @@ impl SenderTimes {
     }
 }
 
+/// The most messages of a latched sender in a part of a recording; a map is sent once per start. One with more sends all the
+/// time, so that a repetition shows nothing, and neither does its last message: controllers of ROS 2 offer even `/odom` as
+/// transient local.
+const LATCHED: u64 = 20;
+
 /// The index of each stream's sender, and the senders without times yet.
 fn places(
+    recorded: &Recorded,
     streams: &[&Stream],
     recordings: &[Option<(Stamp, Stamp)>],
 ) -> (Vec<usize>, Vec<SenderTimes>) {
@@ -192,7 +199,7 @@ fn places(
         let reached = reached.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         SenderTimes {
             node: *node,
-            latched: own().all(|stream| stream.latched),
+            latched: own().all(|s| s.latched && recorded.messages.count(s.times) <= LATCHED),
             recording: reached.unwrap_or((Stamp::MIN, Stamp::MAX)),
             times: Vec::new(),
             every: 1,
