@@ -225,6 +225,17 @@ fn rendered_with(mission: &Value, extensions: &[&str], more: &[&str]) -> TempDir
 }
 
 #[test]
+fn phases_of_a_mission_of_windows_begin_with_them() {
+    let folder = rendered(&running(&ROBOT, 50), &["html"]);
+    let data = data_of(&read(&folder, "x.html"));
+    let starts = data["phases"].as_array().unwrap().iter();
+    let starts: Vec<f64> = starts.map(|phase| phase[0].as_f64().unwrap()).collect();
+    assert!(starts.len() > 2, "{starts:?}");
+    // One that began in the last moment of a window would be named as that window's.
+    assert!(starts.iter().all(|start| start % 10.0 == 0.0), "{starts:?}");
+}
+
+#[test]
 fn collapsed_elements_are_listed_in_page_and_report() {
     let mission = running(&ROBOT, 20);
     let open = rendered(&mission, &["md"]);

@@ -135,6 +135,36 @@ fn why_begins_with_who_publishes_and_when() {
 }
 
 #[test]
+fn why_of_a_role_explains_every_anonymous_node_of_it() {
+    let names = ["/probe_9665_1795171273454", "/probe_9702_1795171300000"];
+    let bag = minute(&[(names[0], "/heat", 0, 20), (names[1], "/heat", 30, 60)]);
+    let dir = tempfile::tempdir().unwrap();
+    fs::write(dir.path().join("r.bag"), write(&bag, Pack::None, 20_000)).unwrap();
+    for asked in ["/probe", "/probe /heat"] {
+        let text = printed(dir.path(), &format!("info r.bag --why {asked}"));
+        let titles = text.lines().filter(|line| !line.starts_with(' '));
+        let titles: Vec<&str> = titles.collect();
+        let expected = match asked {
+            "/probe" => names.map(|name| format!("node {name}")),
+            _ => names.map(|name| format!("{name} publishes /heat")),
+        };
+        assert_eq!(titles, expected, "{text}");
+        // Evidence is kept for all of them.
+        for name in names {
+            let of_name = text.lines().filter(|line| line.contains(name));
+            assert!(of_name.count() > 1, "{text}");
+        }
+    }
+    let done = bagreel(dir.path(), "info r.bag --why /prob");
+    let said = String::from_utf8(done.stderr).unwrap();
+    assert!(said.contains("the nearest name is `/probe`"), "{said}");
+    let done = bagreel(dir.path(), "info r.bag --why /x/pro");
+    let said = String::from_utf8(done.stderr).unwrap();
+    let similar = format!("similar names: /probe, {}", names.join(", "));
+    assert!(said.trim_end().ends_with(&similar), "{said}");
+}
+
+#[test]
 fn why_shows_the_last_errors_before_a_node_stopped() {
     let mut bag = minute(&[("/nav", "/plan", 0, 30)]);
     let log = bag.publisher("/nav", "/rosout", "rosgraph_msgs/Log");

@@ -64,6 +64,86 @@ fn the_end_of_a_second_burst_is_an_event() {
 }
 
 #[test]
+fn a_burst_after_stray_messages_is_an_event_whatever_came_before() {
+    let twice = [(10, 30), (93, 110)];
+    for strays in [&[60_000][..], &[1_800, 60_000], &[45_000, 60_000, 80_000]] {
+        for text in [
+            unnamed(&bursts(strays, &twice)),
+            shown(&bursts(strays, &twice)),
+        ] {
+            let line = text
+                .lines()
+                .find(|line| line.contains("01:33.0"))
+                .unwrap_or_default();
+            assert!(
+                line.contains("/cmd_vel 0.0") && line.ends_with("→ 25 Hz"),
+                "{text}"
+            );
+        }
+    }
+    // Enough of them show a rhythm, which changes; and without any the silence between the bursts says it.
+    let often: Vec<i64> = (0..8).map(|k| 45_000 + k * 5_000).collect();
+    let text = unnamed(&bursts(&often, &twice));
+    assert!(text.contains("~01:33  /cmd_vel 0.2 → 25 Hz"), "{text}");
+    let text = unnamed(&bursts(&[], &twice));
+    assert!(
+        text.contains("silent for 1 min 3 s") && !text.contains("→"),
+        "{text}"
+    );
+}
+
+/// A bag in which `/pose` is sent all the time, and `/cmd_vel` by somebody who presses keys, from 7 s to 27 s.
+fn keys() -> Recording {
+    let mut bag = Recording::default();
+    let pose = bag.publisher("/turtle", "/pose", "std_msgs/Empty");
+    bag.send(pose, (0, 31_000), 16, &[]);
+    let speed = bag.publisher("/keys", "/cmd_vel", "std_msgs/Empty");
+    for at in [
+        7_000, 7_400, 8_900, 9_000, 9_100, 11_000, 12_300, 14_000, 15_900, 17_000, 18_100, 20_000,
+        22_000, 24_000, 27_000,
+    ] {
+        bag.send(speed, (at, at + 1), 1, &[]);
+    }
+    bag.publishers.iter_mut().for_each(|own| own.node.clear());
+    bag
+}
+
+#[test]
+fn a_topic_that_is_sent_at_times_is_named_where_nothing_changed() {
+    let dir = tempfile::tempdir().unwrap();
+    let bytes = mcap::write(&keys(), &mcap::Options::default());
+    fs::write(dir.path().join("r.mcap"), bytes).unwrap();
+    let text = printed(dir.path(), "events r.mcap --phases auto");
+    let lines: Vec<&str> = text.lines().map(str::trim).collect();
+    // Neither the sentence nor the phases claim a change that no line tells.
+    let expected = [
+        "31 s: 2 topics, /cmd_vel at times, nothing changed",
+        "00:00.0  ── phase 1: 2 topics ──",
+    ];
+    assert_eq!(lines, expected);
+    let info = printed(dir.path(), "info r.mcap");
+    assert!(info.starts_with(expected[0]), "{info}");
+    for line in info
+        .lines()
+        .filter(|line| line.contains("bagreel figure --kind"))
+    {
+        let kind = line.split(' ').nth(6).unwrap().trim_end_matches('`');
+        let drawn = printed(
+            dir.path(),
+            &format!("figure r.mcap --kind {kind} -o {kind}.svg --quiet"),
+        );
+        assert!(
+            dir.path().join(format!("{kind}.svg")).exists(),
+            "{line}: {drawn}"
+        );
+    }
+    // Phases of the user remain.
+    fs::write(dir.path().join("p.txt"), "0:00 wait\n0:10 drive\n").unwrap();
+    let text = printed(dir.path(), "events r.mcap --phases p.txt");
+    assert!(text.contains("phase 2: drive"), "{text}");
+}
+
+#[test]
 fn the_recorder_hides_no_topic() {
     let mut bag = Recording::default();
     let log = bag.publisher("", "/rosout", "rcl_interfaces/msg/Log");

@@ -35,6 +35,11 @@ pub(crate) fn role(name: &str) -> &str {
     name
 }
 
+/// Whether a node of this name is meant by its name or by its role.
+pub(crate) fn is_named(name: &str, asked: &str) -> bool {
+    name == asked || role(name) == asked
+}
+
 fn is_number(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit())
 }

@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use crate::base::budget;
 use crate::base::ids::{ById, ids};
+use crate::base::role::is_named;
 use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
 use crate::evidence::source_word;
@@ -306,9 +307,10 @@ impl Observations {
         self.add(source, said, time);
     }
 
-    /// Whether `why` requests an element with these names.
+    /// Whether `why` requests an element with these names, or with this role.
     pub(crate) fn is_watched(&self, names: [Option<Name>; 2]) -> bool {
-        let about = |text: &String| names.iter().flatten().any(|n| *self.text(*n) == **text);
+        let names = names.map(|name| name.map(|name| self.text(name)));
+        let about = |asked: &String| names.iter().flatten().any(|name| is_named(name, asked));
         !self.watched.is_empty() && self.watched.iter().all(about)
     }
 

@@ -9,6 +9,7 @@ use crate::base::time::{Span, Stamp, parse_nanos};
 use crate::base::{budget, file};
 use crate::graph::Elements;
 use crate::graph::history::Sending;
+use crate::graph::window::between;
 use crate::mission::event_log::Phase;
 use crate::mission::phases::{of_spans, phases};
 
@@ -46,6 +47,8 @@ pub(super) struct Basis<'a> {
     /// The time of the mission.
     pub(super) whole: Span,
     pub(super) earlier: Vec<Phase>,
+    /// Whether an event is listed. Where none is, phases would claim changes.
+    pub(super) has_changes: bool,
 }
 
 /// The phases that `reading` asks for.
@@ -65,34 +68,28 @@ pub(super) fn wanted(reading: &Reading, basis: Basis<'_>) -> Result<Vec<Phase>> 
 
 impl Basis<'_> {
     fn found(self) -> Vec<Phase> {
-        if self.earlier.is_empty() {
-            phases(self.elements, self.sending, self.whole)
-        } else {
-            self.earlier
+        if !self.earlier.is_empty() {
+            return self.earlier;
         }
+        let found = phases(self.elements, self.sending, self.whole);
+        if self.has_changes || found.len() < 2 {
+            return found;
+        }
+        self.at(&[])
     }
 
     /// Phases that begin at these times, sorted, with these names. The time before the first is a phase with a default
     /// name.
     fn at(&self, begins: &[(Stamp, String)]) -> Vec<Phase> {
         let whole = self.whole;
-        let begins = begins.iter().filter(|(at, _)| *at < whole.end);
-        let begins: Vec<_> = begins.collect();
-        let mut starts: Vec<Stamp> = begins
-            .iter()
-            .map(|(at, _)| (*at).max(whole.start))
-            .collect();
+        let begins: Vec<_> = begins.iter().filter(|(at, _)| *at < whole.end).collect();
+        let starts = begins.iter().map(|(at, _)| (*at).max(whole.start));
+        let mut starts: Vec<Stamp> = starts.collect();
         let is_led = starts.first().is_none_or(|first| *first > whole.start);
         if is_led {
             starts.insert(0, whole.start);
         }
-        let ends = starts.iter().skip(1).copied().chain([whole.end]);
-        let spans: Vec<Span> = starts
-            .iter()
-            .copied()
-            .zip(ends)
-            .map(|(start, end)| Span::new(start, end))
-            .collect();
+        let spans = between(&starts, whole.end);
         let mut all = of_spans(self.elements, self.sending, whole, &spans);
         let named = all.iter_mut().skip(usize::from(is_led));
         for (phase, (_, name)) in named.zip(begins) {

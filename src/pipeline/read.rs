@@ -28,7 +28,7 @@ use crate::graph::window::{self, Cut, Division, Length, Windows};
 use crate::graph::{History, NodeId, Windowed, graphs, made, traffic, unread};
 use crate::mission::RATE_CHANGE;
 use crate::mission::changes;
-use crate::mission::event_log::{self, EventLog, Interruption, InterruptionKind};
+use crate::mission::event_log::{self, Event, EventLog, Interruption, InterruptionKind};
 use crate::mission::{Mission, Window, read_json};
 
 /// The inputs of a mission and the options of reading them.
@@ -251,6 +251,7 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
         sending: &mission.sending,
         whole: mission.span,
         earlier: std::mem::take(&mut mission.log.phases),
+        has_changes: mission.log.events.iter().any(Event::is_headline),
     };
     mission.log.phases = wanted(reading, basis)?;
     Ok(mission)
@@ -374,6 +375,7 @@ fn log_of(history: &History, collected: &Collected, reading: &Reading) -> Result
         sending: &history.sending,
         whole: collected.range,
         earlier: Vec::new(),
+        has_changes: events.iter().any(Event::is_headline),
     };
     let one = |time, kind, length| Interruption {
         time,

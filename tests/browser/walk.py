@@ -17,7 +17,7 @@ MOST = 12
 SEEK = "return +document.getElementById('seek').value"
 EMPTY = """
 return [...document.querySelectorAll('aside > :is(section, details)')].filter(part => part.getClientRects().length
-    && ![...part.querySelectorAll('input, button, svg, td, label, li')].length && part.querySelector('.list, #legend')).map(part => part.id || part.textContent);
+    && ![...part.querySelectorAll('input, button, svg, td, label, li, #changes > p')].length && part.querySelector('.list, #legend')).map(part => part.id || part.textContent);
 """
 
 

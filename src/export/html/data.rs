@@ -200,16 +200,12 @@ fn graph<'a>(
 }
 
 fn phases(mission: &Mission, clock: PageClock) -> Vec<(f64, f64, String)> {
-    let log = &mission.log;
-    // Where no event is listed, phases would claim changes.
-    let is_listed = log.headlines(mission.span).next().is_some();
-    let phases = log
-        .phases
-        .iter()
-        .filter(|_| is_listed && log.phases.len() > 1);
-    let phases = phases.map(|p| {
+    let all = &mission.log.phases;
+    let phases = all.iter().filter(|_| all.len() > 1).map(|p| {
         let name = visible(&p.name).into_owned();
-        (clock.secs(p.span.start), clock.secs(p.span.end), name)
+        // Of windows, one begins just after the last instant of the one before.
+        let start = clock.secs(p.span.start.plus(1));
+        (start, clock.secs(p.span.end), name)
     });
     phases.collect()
 }

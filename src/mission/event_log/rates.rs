@@ -5,9 +5,9 @@
 
 use super::drafts::{Drafts, LogInput};
 use super::{Detail, Kind};
-use crate::base::rhythm::{ABOUT_NONE, RATE_PAUSE_NS};
+use crate::base::rhythm::{ABOUT_NONE, FEWEST, RATE_PAUSE_NS};
 use crate::graph::Element;
-use crate::graph::history::{Bound, Sender, Stretch, hide, strays};
+use crate::graph::history::{Bound, Sender, Stretch, hide};
 
 /// The error of a rate as a fraction of it: a step from 8 to 10 Hz is not more than a quarter.
 const EXACT: f64 = 0.01;
@@ -16,13 +16,13 @@ const EXACT: f64 = 0.01;
 pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     let senders = context.history.sending.senders.iter();
     for sender in senders.filter(|v| !v.is_latched && !context.is_by_the_way(v.topic)) {
-        let first = strays(&sender.stretches);
+        let mut start = 0;
         for (pair, end) in sender.stretches.windows(2).zip(1..) {
             let (before, after) = (&pair[0], &pair[1]);
+            start = if before.has_rate() { end } else { start };
             let gap = (before.last, Some(after.first));
-            let is_first = end == first && !hide(&context.history.pauses, gap);
-            let none = is_first.then(|| about_none(&sender.stretches[..end], after));
-            let none = none.flatten();
+            let none = about_none(&sender.stretches[start..end], after);
+            let none = none.filter(|_| !hide(&context.history.pauses, gap));
             let is_change = changes(before, after, context.rate_change);
             let from_hz = none.or_else(|| is_change.then(|| before.hz()));
             let Some(from_hz) = from_hz.filter(|_| !is_away(context, sender, before, after)) else {
@@ -49,12 +49,14 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     }
 }
 
-/// The rate of stray messages from which a steady rate begins, such as 0.01 Hz of one message 90 s before; `None` if it does not.
+/// The rate of the stray messages, since the last rate, from which a steady rate begins, such as 0.01 Hz of one message 90 s before;
+/// `None` if it does not, or if they are enough to show a rhythm.
 fn about_none(strays: &[Stretch], after: &Stretch) -> Option<f64> {
-    let count: u64 = strays.iter().map(|s| s.count).sum();
+    // Each has a message, so that many need not be counted at each of many stretches.
+    let count: u64 = strays.iter().zip(0..FEWEST).map(|(s, _)| s.count).sum();
     let (first, last) = (strays.first()?.first, strays.last()?.last);
     let hz = count as f64 * 1e9 / after.first.since(first).max(1) as f64;
-    let begins = after.has_rate() && hz * ABOUT_NONE < after.hz();
+    let begins = count < FEWEST && after.has_rate() && hz * ABOUT_NONE < after.hz();
     (begins && after.first.since(last) > RATE_PAUSE_NS).then_some(hz)
 }
 

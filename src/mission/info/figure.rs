@@ -5,10 +5,11 @@ use std::collections::BTreeSet;
 use serde::Serialize;
 
 use crate::base::name::is_quiet;
+use crate::base::time::Span;
 use crate::base::words;
 use crate::graph::{Element, NodeId, TopicId};
 use crate::mission::Mission;
-use crate::mission::event_log::Detail;
+use crate::mission::event_log::{Detail, Phase};
 use crate::mission::phases::knows_publishers;
 
 /// A figure that fits a mission.
@@ -20,6 +21,12 @@ pub struct FigureInfo {
     pub shows: String,
 }
 
+impl FigureInfo {
+    fn of(figure: &'static str, shows: String) -> Self {
+        Self { figure, shows }
+    }
+}
+
 /// The figures that fit, best first: lifelines if elements start or stop, else the graph if edges are known.
 pub(crate) fn figures(mission: &Mission) -> Vec<FigureInfo> {
     let many = mission.log.phases.len();
@@ -27,7 +34,7 @@ pub(crate) fn figures(mission: &Mission) -> Vec<FigureInfo> {
         lives(mission),
         graph(mission),
         holders(mission),
-        steps(many),
+        steps(mission),
     ];
     let mut all: Vec<FigureInfo> = fitting.into_iter().flatten().collect();
     if many <= 1 {
@@ -51,10 +58,7 @@ fn lives(mission: &Mission) -> Option<FigureInfo> {
         let topics = words::count(topics, "topic");
         format!("when each topic carried messages: {topics}, most without a known publisher")
     };
-    (topics > 0).then_some(FigureInfo {
-        figure: "lives",
-        shows: lives,
-    })
+    (topics > 0).then(|| FigureInfo::of("lives", lives))
 }
 
 fn graph(mission: &Mission) -> Option<FigureInfo> {
@@ -70,13 +74,9 @@ fn graph(mission: &Mission) -> Option<FigureInfo> {
         topic.is_some_and(|t| !is_quiet(t.name.as_str()))
     });
     let both = both.count();
-    (both > 0).then(|| FigureInfo {
-        figure: "graph",
-        shows: format!(
-            "who publishes to whom, and when: over {}",
-            words::count(both, "topic")
-        ),
-    })
+    let many = words::count(both, "topic");
+    let shows = format!("who publishes to whom, and when: over {many}");
+    (both > 0).then(|| FigureInfo::of("graph", shows))
 }
 
 /// The topics of edges whose nodes are shown.
@@ -93,17 +93,20 @@ fn holders(mission: &Mission) -> Option<FigureInfo> {
     });
     let topics: BTreeSet<Element> = topics.collect();
     let many = words::count(topics.len(), "topic");
-    (!topics.is_empty()).then(|| FigureInfo {
-        figure: "holders",
-        shows: format!("who sends what, and when nobody does: {many} that change hands"),
-    })
+    let shows = format!("who sends what, and when nobody does: {many} that change hands");
+    (!topics.is_empty()).then(|| FigureInfo::of("holders", shows))
 }
 
-fn steps(phases: usize) -> Option<FigureInfo> {
-    let many = phases.checked_sub(1).filter(|n| *n > 0)?;
-    let many = words::count(many, "step");
-    Some(FigureInfo {
-        figure: "steps",
-        shows: format!("the reconfigurations one by one: {many}"),
-    })
+/// A step lasts from the middle of a phase to that of the next one, and shows the nodes that start, stop or take over in it.
+fn steps(mission: &Mission) -> Option<FigureInfo> {
+    let middle = |phase: &Phase| phase.span.start.plus(phase.span.nanos() / 2);
+    let is_step = |pair: &&[Phase]| {
+        let span = Span::new(middle(&pair[0]), middle(&pair[1]));
+        let mut all = mission.log.headlines(span).map(|(_, event)| event);
+        all.any(|e| e.what.is_node() || matches!(e.detail, Detail::Senders { .. }))
+    };
+    let many = mission.log.phases.windows(2).filter(is_step).count();
+    let words = words::count(many, "step");
+    let shows = format!("the reconfigurations one by one: {words}");
+    (many > 0).then(|| FigureInfo::of("steps", shows))
 }

@@ -6,7 +6,7 @@ use std::cmp::Reverse;
 use super::{Info, TopicInfo};
 use crate::base::cast;
 use crate::base::ids::grouped;
-use crate::base::name::{last_part, namespace};
+use crate::base::name::{is_quiet, last_part, namespace};
 use crate::base::rhythm::CLOSE_NS;
 use crate::base::words::{self, visible};
 use crate::graph::Element;
@@ -65,7 +65,7 @@ pub(crate) fn summary(mission: &Mission, info: &Info) -> String {
     });
     let moments: Vec<String> = moments.collect();
     let many = match all.len() {
-        0 => "nothing changed".to_owned(),
+        0 => at_times(mission) + "nothing changed",
         many => words::count(many, "change"),
     };
     let first = format!("{}, {many}", contents(info));
@@ -73,6 +73,20 @@ pub(crate) fn summary(mission: &Mission, info: &Info) -> String {
         return first;
     }
     format!("{first}. {}", moments.join("; "))
+}
+
+/// The topics whose first or last message shows no change, such as the last key that somebody presses: `/cmd_vel at times, `.
+fn at_times(mission: &Mission) -> String {
+    let topic = |event: &Event| mission.elements.names(event.what).1.unwrap_or_default();
+    let own = mission.log.events.with_ids();
+    let own = own.filter(|(_, e)| e.part_of.is_none() && e.what.is_topic() && !is_quiet(topic(e)));
+    let mut own: Vec<Headline<'_>> = own.collect();
+    own.sort_by_key(|(_, e)| e.what);
+    own.dedup_by_key(|(_, e)| e.what);
+    match names(mission, &own, MOMENT.elements) {
+        names if own.is_empty() => names,
+        names => names + " at times, ",
+    }
 }
 
 /// The length, the nodes and the topics with messages; the rate if there is only one.

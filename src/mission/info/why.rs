@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use crate::base::error::{Error, Result};
-use crate::base::name::is_quiet;
+use crate::base::name::{is_quiet, last_part};
 use crate::base::nearest::nearest;
+use crate::base::role::is_named;
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
 use crate::evidence::EvidenceLine;
@@ -15,7 +16,8 @@ use crate::mission::event_log::{Event, Kind, LogFormat, LogRow, row_lines};
 
 /// The elements with all of `names` (one: a node or topic of that name; two: the edges between them), each with the answer
 /// and its kinds of evidence, then the `pieces` in order of time, the recorder's last. Plain text, a line each; repeated
-/// pieces are written once, with their number. Names are as recorded.
+/// pieces are written once, with their number. Names are as recorded; `/probe` also means every anonymous node
+/// `/probe_PID_MILLISECONDS`.
 ///
 /// # Errors
 /// [`Error::Usage`] if the mission has no such element, naming similar ones.
@@ -86,25 +88,16 @@ fn said(pieces: &[EvidenceLine]) -> Vec<Repeated<'_>> {
 
 /// The elements with these names, each with a description.
 fn elements(mission: &Mission, names: &[String]) -> Vec<(Element, String)> {
-    let all = &mission.elements;
-    let node = |edge: &Edge| all.nodes[edge.node].name.as_str();
-    let topic = |edge: &Edge| all.topics[edge.topic].name.as_str();
-    if let [name] = names {
-        let node = all.node(name).map(|id| (Element::Node(id), "node"));
-        let topic = all.topic(name).map(|id| (Element::Topic(id), "topic"));
-        let found = node.into_iter().chain(topic);
-        return found
-            .map(|(what, word)| (what, format!("{word} {name}")))
-            .collect();
-    }
-    let is_asked = |edge: &&Edge| names.iter().all(|n| n == node(edge) || n == topic(edge));
-    let edges = all.edges().filter(|(_, e)| is_asked(e));
-    let titled = edges.map(|(what, e)| {
-        let verb = match what {
-            Element::Publish(_) => "publishes",
-            _ => "subscribes to",
+    let titled = mission.elements.all().filter_map(|what| {
+        let (node, topic) = mission.elements.names(what);
+        let own = [node, topic];
+        let is_asked = |asked: &String| own.iter().flatten().any(|name| is_named(name, asked));
+        let title = match (what, node, topic) {
+            (Element::Publish(_), Some(node), Some(topic)) => format!("{node} publishes {topic}"),
+            (_, Some(node), Some(topic)) => format!("{node} subscribes to {topic}"),
+            (_, node, topic) => format!("{} {}", what.word(), node.or(topic)?),
         };
-        (what, format!("{} {verb} {}", node(e), topic(e)))
+        (what.is_edge() == (names.len() > 1) && names.iter().all(is_asked)).then_some((what, title))
     });
     titled.collect()
 }
@@ -222,21 +215,14 @@ fn happened(mission: &Mission, element: Element, pieces: &[EvidenceLine]) -> Vec
 
 /// When an element existed: `00:38–02:56`, `04:59–` to the end, `throughout`.
 fn when(mission: &Mission, what: Element) -> String {
-    let at = |time: Stamp, is_open: bool| {
-        if is_open {
-            String::new()
-        } else {
-            words::offset_seconds(mission.offset(time))
-        }
-    };
+    let at = |time: Stamp| words::offset_seconds(mission.offset(time));
     let whole = mission.span;
     let lives = mission.elements.seen(what).lives.iter().map(|life| {
-        let from = at(life.start, life.start <= whole.start);
-        let to = at(life.end, life.end >= whole.end);
-        if from.is_empty() && to.is_empty() {
-            "throughout".to_owned()
-        } else {
-            format!("{from}–{to}")
+        let from = Some(life.start).filter(|at| *at > whole.start).map(at);
+        let to = Some(life.end).filter(|at| *at < whole.end).map(at);
+        match (from, to) {
+            (None, None) => "throughout".to_owned(),
+            (from, to) => format!("{}–{}", from.unwrap_or_default(), to.unwrap_or_default()),
         }
     });
     words::some_of(&lives.collect::<Vec<String>>(), TIMES)
@@ -273,7 +259,7 @@ const OFFERED: usize = 5;
 
 fn unknown(mission: &Mission, names: &[String]) -> Error {
     let all = &mission.elements;
-    let nodes = || all.nodes.iter().map(|n| n.name.as_str());
+    let nodes = || all.nodes.iter().flat_map(|n| [n.name.as_str(), &*n.role]);
     let known = || nodes().chain(all.topics.iter().map(|t| t.name.as_str()));
     let Some(name) = names
         .iter()
@@ -291,10 +277,10 @@ fn unknown(mission: &Mission, names: &[String]) -> Error {
 
 /// The hint for a name unlike any other in its spelling: names that contain its last part.
 fn similar<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
-    let last = |name: &str| name.rsplit('/').next().unwrap_or_default().to_lowercase();
-    let last = last(name);
+    let last = last_part(name).to_lowercase();
     let close = known.filter(|known| !last.is_empty() && known.to_lowercase().contains(&last));
-    let close: Vec<&str> = close.take(OFFERED).collect();
+    let close: BTreeSet<&str> = close.collect();
+    let close: Vec<&str> = close.into_iter().take(OFFERED).collect();
     if close.is_empty() {
         "`bagreel info` lists every name".to_owned()
     } else {
