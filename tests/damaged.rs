@@ -356,6 +356,48 @@ fn reading_an_mcap_file_continues_after_damage() {
 }
 
 #[test]
+fn the_records_behind_a_broken_one_are_read_where_nothing_is_compressed() {
+    let recording = short();
+    let mcap = |chunked| {
+        let options = mcap::Options {
+            summary: false,
+            compression: None,
+            chunk: 1 << 20,
+            chunked,
+            ..mcap::Options::default()
+        };
+        mcap::write(&recording, &options)
+    };
+    let bag = rosbag1::write(&recording, Pack::None, 1 << 20);
+    for (name, bytes) in [
+        ("x.bag", rosbag1::unindexed(&bag)),
+        ("chunk.mcap", mcap(true)),
+        ("loose.mcap", mcap(false)),
+    ] {
+        let at = |part: &[u8]| bytes.windows(part.len()).position(|w| w == part);
+        let scan = at(&[1; 400]).unwrap();
+        let whole = read_bytes(name, &bytes).1.payloads();
+        let without = |head: std::ops::Range<usize>| {
+            let mut bytes = bytes.clone();
+            bytes[head].fill(0);
+            let (report, kept) = read_bytes(name, &bytes);
+            assert!(!report.complete, "{name}");
+            assert!(kept.stamps.len() >= kept.messages.len(), "{name}");
+            kept.payloads()
+        };
+        let found = without(scan - 30..scan);
+        assert_eq!(found.len(), whole.len() - 1, "{name}");
+        assert!(found.iter().all(|one| whole.contains(one)), "{name}");
+        // The head of the chunk, before its first record.
+        let first = at(b"compression=none").map(|at| at - 20..at + 20);
+        let first = first.or_else(|| at(b"nav_msgs/OccupancyGrid").map(|at| at - 45..at - 15));
+        if name != "loose.mcap" {
+            assert_eq!(without(first.unwrap()), whole, "{name}");
+        }
+    }
+}
+
+#[test]
 fn connections_that_only_the_chunks_describe_are_found_there() {
     let recording = short();
     let bytes = rosbag1::write(&recording, Pack::Lz4, 4000);

@@ -5,6 +5,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
 use crate::bag::model::{ConnectionId, Message, Reader, Sink};
+use crate::bag::straight::pass;
 use crate::base::error::Result;
 use crate::base::ids::ById;
 use crate::base::notice::{Notice, NoticeKind};
@@ -45,13 +46,11 @@ impl Sink for Clip<'_> {
         if stamps.iter().all(|t| range.contains(*t)) {
             return self.sink.stamps(connection, stamps, sizes);
         }
-        let inside = |at: &usize| range.contains(stamps[*at]);
-        let kept: Vec<usize> = (0..stamps.len()).filter(inside).collect();
-        let stamps: Vec<Stamp> = kept.iter().map(|at| stamps[*at]).collect();
-        let sizes: Option<Vec<u32>> = sizes.map(|s| kept.iter().map(|at| s[*at]).collect());
-        if !stamps.is_empty() {
-            self.sink.stamps(connection, &stamps, sizes.as_deref());
-        }
+        let inside = stamps
+            .iter()
+            .map(|at| Some(*at).filter(|at| range.contains(*at)));
+        let inside: Vec<Option<Stamp>> = inside.collect();
+        pass(self.sink, connection, &inside, sizes);
     }
 
     fn message(&mut self, message: Message<'_>) {

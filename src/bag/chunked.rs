@@ -30,9 +30,9 @@ use crate::base::time::{Span, Stamp};
 pub(crate) use growing::follow;
 use index::Query;
 pub(crate) use index::{ChunkBody, Index, IndexSum, LONGEST_INDEX};
-pub(crate) use plan::{Chunk, ChunkPlan, Fault, MOST_CHUNKS, Unindexed, Used};
+pub(crate) use plan::{Chunk, ChunkPlan, Fault, Tail, Unindexed};
 pub(crate) use record::{
-    ChunkHead, Connections, Counts, NoRecord, RecordHead, SecondFinds, pass, walk,
+    ChunkHead, Connections, Counts, NoRecord, RecordHead, SecondFinds, pass, peek_whole, walk,
 };
 
 /// The parser for one format of chunked bags. A value keeps the state that later descriptions depend on.
@@ -73,6 +73,10 @@ pub(crate) trait Grammar: Default + Send + 'static {
 
     /// Whether a chunk begins here. Called at every byte after a broken record.
     fn is_chunk(bytes: &[u8]) -> bool;
+
+    /// Whether a message or a description begins here, which another record or the end of the bytes follows. Called at every
+    /// byte after a broken record.
+    fn is_content(bytes: &[u8]) -> bool;
 
     /// The index records in `bytes`, if they add up to `promised`.
     fn index(bytes: &[u8], promised: &IndexSum) -> Option<Index>;

@@ -90,6 +90,10 @@ impl Grammar for Mcap {
         records::is_chunk(bytes)
     }
 
+    fn is_content(bytes: &[u8]) -> bool {
+        records::is_content(bytes)
+    }
+
     fn index(bytes: &[u8], promised: &IndexSum) -> Option<Index> {
         let mut found = IndexSum::default();
         let mut index = Index::default();

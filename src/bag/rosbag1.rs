@@ -90,10 +90,16 @@ impl Grammar for Rosbag1 {
     }
 
     fn is_chunk(bytes: &[u8]) -> bool {
-        // Real headers take 40 to 60 bytes, and this is tested at every byte.
-        let len = records::u32_at(bytes, 0).filter(|n| (20..200).contains(n));
-        let header = len.and_then(|n| bytes.get(4..4 + n as usize));
-        matches!(header.and_then(records::parse), Some(Header::Chunk { .. }))
+        matches!(records::short(bytes), Some((Header::Chunk { .. }, _)))
+    }
+
+    fn is_content(bytes: &[u8]) -> bool {
+        let Some((Header::Message { .. } | Header::Connection { .. }, len)) = records::short(bytes)
+        else {
+            return false;
+        };
+        let next = bytes.get(len..);
+        next.is_some_and(|next| next.is_empty() || records::short(next).is_some())
     }
 
     fn index(bytes: &[u8], promised: &IndexSum) -> Option<Index> {

@@ -12,7 +12,7 @@ use crate::bag::deferred::open_each;
 use crate::bag::folder::{Recording, is_spare, only_recording, recordings};
 use crate::bag::input::{BagPlace, FormatRow, Input, file_name, size_on_disk};
 use crate::bag::model::{
-    Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink, Want,
+    Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink, Want, damaged,
 };
 use crate::bag::unknown::explain;
 use crate::base::budget::FILES;
@@ -77,10 +77,10 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     };
     match metadata::read(&path) {
         Ok(found) => folder.metadata = found.unwrap_or_default(),
-        Err(why) => folder.note(
-            NoticeKind::Note,
-            format!("`metadata.yaml` was left out: {why}"),
-        ),
+        Err(why) => {
+            let text = format!("`metadata.yaml` was left out: {why}");
+            folder.note(NoticeKind::Note, text);
+        }
     }
     let mut failed = None;
     if parts.is_empty() {
@@ -157,10 +157,8 @@ impl BagFolder {
         let instead = found.is_empty() && !there.is_empty();
         for why in missing {
             if instead {
-                self.note(
-                    NoticeKind::Note,
-                    format!("{why}; read the existing files instead"),
-                );
+                let text = format!("{why}; read the existing files instead");
+                self.note(NoticeKind::Note, text);
             } else {
                 self.note(
                     NoticeKind::Damaged,
@@ -267,10 +265,7 @@ impl Reader for BagFolder {
                 Ok(report) => reports.push(report),
                 Err(e) => {
                     complete = false;
-                    joined.notice(Notice::new(
-                        NoticeKind::Damaged,
-                        format!("a part was left out: {e}"),
-                    ));
+                    damaged(&mut joined, 1, &format!("a part was left out: {e}"));
                 }
             }
         }

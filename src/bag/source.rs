@@ -246,24 +246,21 @@ impl<'a> ByteStream<'a> {
         self.filled - self.used
     }
 
-    /// Reads until `n` bytes are buffered or the stream ends.
+    /// Reads until `n` bytes are buffered or the stream ends. What is buffered stays where it is as long as there is room, or
+    /// many looks ahead near the end would copy it each time.
     fn fill(&mut self, n: usize) -> io::Result<()> {
         self.update_sum();
-        self.summed = 0;
-        self.buffer.copy_within(self.used..self.filled, 0);
-        self.filled = self.ahead();
-        self.used = 0;
-        while self.filled < n {
-            let next = self.at + self.filled as u64;
-            let mut size = self.step.max(n) - self.filled;
-            if let From::File { end, .. } = self.from {
-                let left = end.saturating_sub(next);
-                size = size.min(usize::try_from(left).unwrap_or(usize::MAX));
-            }
-            let end = self.filled + size;
-            if self.buffer.len() < end {
-                self.buffer.resize(end, 0);
-            }
+        let left = self.left().and_then(|left| usize::try_from(left).ok());
+        let most = self.step.max(n).min(left.unwrap_or(usize::MAX));
+        if self.buffer.len() < self.used + n.min(most) {
+            self.buffer.copy_within(self.used..self.filled, 0);
+            (self.filled, self.used) = (self.ahead(), 0);
+            self.buffer.resize(most.max(self.buffer.len()), 0);
+        }
+        self.summed = self.used;
+        while self.ahead() < n.min(most) {
+            let next = self.at + self.ahead() as u64;
+            let end = self.buffer.len().min(self.used + most);
             let into = &mut self.buffer[self.filled..end];
             let got = match &mut self.from {
                 From::File { source, .. } => source.read_at(next, into)?,

@@ -15,7 +15,8 @@ use std::sync::Arc;
 use crate::bag::adapters::{Clip, in_order, share};
 use crate::bag::input::{BagPlace, FormatRow, file_name};
 use crate::bag::model::{
-    Connection, ConnectionId, Encoding, MOST_PAYLOAD, OpenOptions, Reader, Report, Sink, Tier, Want,
+    Connection, ConnectionId, Encoding, MOST_PAYLOAD, OpenOptions, Reader, Report, Sink, Tier,
+    Want, damaged,
 };
 use crate::bag::source::FileSource;
 use crate::base::budget::CONNECTIONS;
@@ -324,10 +325,7 @@ fn check(db: &Db, sink: &mut dyn Sink) {
     let found = db.first("PRAGMA integrity_check(1)", &[], |row| row.text(0));
     let result = found.map_or_else(|e| e.to_string(), Option::unwrap_or_default);
     if result != "ok" {
-        sink.notice(Notice::new(
-            NoticeKind::Damaged,
-            format!("the database is damaged: {result}"),
-        ));
+        damaged(sink, 1, &format!("the database is damaged: {result}"));
     }
 }
 
@@ -347,7 +345,7 @@ impl Reader for Sqlite3Bag {
         Want::resolve(&mut wants);
         if self.ready.left_behind {
             let text = "the newest rows lie in a log beside the bag that is too large to copy";
-            clip.notice(Notice::new(NoticeKind::Damaged, text));
+            damaged(&mut clip, 1, text);
         }
         self.notices.iter().for_each(|n| clip.notice(n.clone()));
         let db = Db::open(&self.ready).map_err(|e| broken(&self.path, &e))?;

@@ -309,7 +309,9 @@ pub(crate) fn pass(
         let kept = sizes.iter().zip(stamps).filter(|(_, kept)| kept.is_some());
         kept.map(|(size, _)| *size).collect::<Vec<u32>>()
     });
-    sink.stamps(connection, &kept, sizes.as_deref());
+    if !kept.is_empty() {
+        sink.stamps(connection, &kept, sizes.as_deref());
+    }
     (stamps.len() - kept.len()) as u64
 }
 

@@ -1,23 +1,25 @@
 #!/usr/bin/env python3
 """Measures how time and memory grow with the names, nodes, topics and files of a recording. Run by hand:
 
-    tests/bench/growth.py BAGREEL [KIND...]
+    tests/bench/growth.py BAGREEL [--sizes 5000,10000] [--rounds 3] [--only COMMAND] [KIND...]
 
-Makes recordings of three sizes, each twice the one before, and prints as Markdown the processor time and the most memory
-of each command at the largest, and how many times as much it took as at half the size. Ends with 1 where twice the size
-takes more than 2.3 times as much (of runs of at least a third of a second or 64 MB), an evidence command more than
-256 MB, a drawing more than 512 MB, or a command fails without refusing a drawing as too large.
+Makes recordings of several sizes, each twice the one before, and prints as Markdown the processor time and the most memory
+of each command, and how many times as much it took as at half the size. Ends with 1 where twice the size takes more than
+2.4 times as much time (of runs of at least a third of a second) or twice the memory (of at least 64 MB), an evidence command
+more than 256 MB, a drawing more than 512 MB, or a command fails without refusing a drawing as too large.
 """
 
+import argparse
 import os
+import shutil
 import struct
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-SIZES = (10_000, 20_000, 40_000)
-MOST = 2.3
+SIZES = "5000,10000,20000,40000"
+MOST_TIME, MOST_MEMORY = 2.4, 2.0
 EVIDENCE_MB, DRAWING_MB = 256, 512
 # Seconds from which a run is measured once.
 LONG = 8
@@ -185,6 +187,13 @@ def launched(many, folder):
     return [*bag, "--topology", folder / "all.launch"]
 
 
+def drawn(many, folder):
+    """A chain of as many nodes and topics of a DOT file without blanks, beside a recording of three nodes."""
+    chain = "->".join(f'"/{"nt"[k % 2]}{k // 2}"' for k in range(2 * many))
+    (folder / "all.dot").write_text("digraph{" + chain + "}")
+    return [*nodes(3, folder), "--topology", folder / "all.dot"]
+
+
 def hub(many, folder):
     """A third as many nodes with three topics each, to all of which one node subscribes."""
     bag = Bag()
@@ -204,7 +213,7 @@ def files(many, folder):
     return [path for part in parts for path in part]
 
 
-KINDS = {f.__name__: f for f in (statistics, logs, nodes, hub, together, spread, goals, launched, files)}
+KINDS = {f.__name__: f for f in (statistics, logs, nodes, hub, together, spread, goals, launched, drawn, files)}
 COMMANDS = {
     "info": ["info"],
     "events": ["events"],
@@ -216,31 +225,38 @@ COMMANDS = {
     "dot": ["render", "-q", "-o", "x.dot"],
     "mermaid": ["render", "-q", "-o", "x.mmd"],
     "markdown": ["render", "-q", "-o", "x.md"],
+    "pdf": ["render", "-q", "-o", "x.pdf"],
+    "csv": ["render", "-q", "-o", "x.csv"],
     "graph": ["figure", "--kind", "graph", "-o", "graph.svg"],
     "lives": ["figure", "--kind", "lives", "-o", "lives.svg"],
     "holders": ["figure", "--kind", "holders", "-o", "holders.svg"],
     "steps": ["figure", "--kind", "steps", "-o", "steps.svg"],
     "extract": ["extract", "-o", "x.csv"],
+    "fields": ["extract", "--fields", "-o", "fields/"],
+    "tables": ["tables", "-o", "tables/"],
+    "diff": ["diff", "x.json"],
     "baseline": ["baseline", "-o", "expect.yaml"],
     "check": ["check", "--expect", "expect.yaml"],
 }
-DRAWINGS = ("page", "gif", "png", "svg", "graph", "lives", "holders", "steps")
+DRAWINGS = ("page", "gif", "png", "svg", "pdf", "graph", "lives", "holders", "steps")
 
 
-def measured(program, command, recordings):
-    """Per recording the seconds of processor time, megabytes, and the words of a failure: of five rounds over all
+def measured(program, command, recordings, rounds):
+    """Per recording the seconds of processor time, megabytes, and the words of a failure: of some rounds over all
     recordings the least time in the program and the least in the kernel, as the speed of a machine varies, and the host
     of a virtual one may take back free memory, which the kernel then clears slowly; long runs are measured once.
     """
-    rounds = [[measured_once(program, command, *recording)] for recording in recordings]
-    for _ in range(4):
-        for of, recording in zip(rounds, recordings):
+    runs = [[measured_once(program, command, *recording)] for recording in recordings]
+    for _ in range(rounds - 1):
+        for of, recording in zip(runs, recordings):
             if of[0][0] < LONG:
                 of.append(measured_once(program, command, *recording))
-    return [(min(r[0] for r in of) + min(r[1] for r in of), min(r[2] for r in of), max(r[3] for r in of)) for of in rounds]
+    return [(min(r[0] for r in of) + min(r[1] for r in of), min(r[2] for r in of), max(r[3] for r in of)) for of in runs]
 
 
 def measured_once(program, command, inputs, folder):
+    for old in ("fields", "tables"):
+        shutil.rmtree(folder / old, ignore_errors=True)
     with open(folder / "printed", "w+b") as printed, open(folder / "said", "w+b") as said:
         child = subprocess.Popen([program, *command, *inputs], cwd=folder, stdout=printed, stderr=said)
         _, status, usage = os.wait4(child.pid, 0)
@@ -257,9 +273,9 @@ def measured_once(program, command, inputs, folder):
 def fault(command, before, now):
     """Whether a limit is exceeded, in a word."""
     found = []
-    if now[0] >= 1 / 3 and now[0] > MOST * max(before[0], 0.05):
+    if now[0] >= 1 / 3 and now[0] > MOST_TIME * max(before[0], 0.05):
         found.append("time")
-    if now[1] >= 64 and now[1] > MOST * before[1]:
+    if now[1] >= 64 and now[1] > MOST_MEMORY * before[1]:
         found.append("memory")
     if now[1] > (DRAWING_MB if command in DRAWINGS else EVIDENCE_MB):
         found.append("too large")
@@ -267,26 +283,34 @@ def fault(command, before, now):
 
 
 def main():
-    program = os.path.abspath(sys.argv[1])
+    args = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    args.add_argument("program", type=os.path.abspath)
+    args.add_argument("--sizes", default=SIZES)
+    args.add_argument("--rounds", type=int, default=3)
+    args.add_argument("--only", action="append", choices=COMMANDS)
+    args.add_argument("kinds", nargs="*", choices=[*KINDS, []])
+    args = args.parse_args()
+    sizes = [int(size) for size in args.sizes.split(",")]
+    # `check` needs the file of `baseline`, and `diff` that of `json`.
+    commands = {name: words for name, words in COMMANDS.items() if name in (args.only or COMMANDS)}
     faults = 0
-    print("| recording | command | 10,000 | 20,000 | 40,000 | growth of time | of memory | |")
-    print("|---|---|---|---|---|---|---|---|")
-    for kind in sys.argv[2:] or KINDS:
+    print("| recording | command | " + " | ".join(f"{size:,}" for size in sizes) + " | growth of time | of memory | |")
+    print("|---" * (len(sizes) + 5) + "|")
+    for kind in args.kinds or KINDS:
         with tempfile.TemporaryDirectory() as scratch:
             recordings = []
-            for many in SIZES:
+            for many in sizes:
                 folder = Path(scratch) / str(many)
                 folder.mkdir()
                 recordings.append((KINDS[kind](many, folder), folder))
-            runs = {command: measured(program, words, recordings) for command, words in COMMANDS.items()}
-        for command, of in runs.items():
-            cells = [f"{seconds:.2f} s, {mb:.0f} MB" for seconds, mb, _ in of]
-            growth = [f"×{b[at] / a[at]:.2f}" if a[at] > 0 else "" for at in (0, 1) for a, b in zip(of, of[1:])]
-            wrong = [fault(command, *pair) for pair in zip(of, of[1:])] + [words for *_, words in of]
-            wrong = list(dict.fromkeys(word for word in wrong if word))
-            faults += wrong not in ([], ["refused"])
-            row = [kind, command, *cells, ", ".join(growth[:2]), ", ".join(growth[2:]), "; ".join(wrong)]
-            print("| " + " | ".join(row) + " |", flush=True)
+            for command, words in commands.items():
+                of = measured(args.program, words, recordings, args.rounds)
+                cells = [f"{seconds:.2f} s, {mb:.0f} MB" for seconds, mb, _ in of]
+                growth = [", ".join(f"×{b[at] / max(a[at], 0.01):.2f}" for a, b in zip(of, of[1:])) for at in (0, 1)]
+                wrong = [fault(command, *pair) for pair in zip(of, of[1:])] + [failure for *_, failure in of]
+                wrong = list(dict.fromkeys(word for word in wrong if word))
+                faults += wrong not in ([], ["refused"])
+                print("| " + " | ".join([kind, command, *cells, *growth, "; ".join(wrong)]) + " |", flush=True)
     sys.exit(faults > 0)
 
 

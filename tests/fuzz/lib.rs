@@ -161,12 +161,16 @@ pub fn damage_packed(bytes: &[u8]) {
     let Some((name, file, is_cut)) = damaged(bytes) else {
         return;
     };
-    let packed = zstd::encode_all(&file[..], 1).expect("a frame");
     let is_open = is_cut && name.starts_with("front") && name.ends_with(".bag");
-    if let Some((found, is_said)) = count(&packed, false) {
+    if let Some((found, is_said)) = count(&packed(&file), false) {
         let is_whole = found >= tiny::MESSAGES as u64;
         assert!(is_whole || is_said || is_open, "{name}: {found} messages without a notice");
     }
+}
+
+/// The bytes as a Zstandard frame.
+pub fn packed(bytes: &[u8]) -> Vec<u8> {
+    zstd::encode_all(bytes, 1).expect("a frame")
 }
 
 /// Damages two or three healthy files and reads them into one mission.

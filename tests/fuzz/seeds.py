@@ -7,10 +7,10 @@ ROOT = HERE.parents[1]
 MOST = 60_000
 
 BY_ENDING = {
-    ".bag": ["rosbag1", "verify", "graph"],
+    ".bag": ["rosbag1", "verify", "graph", "zstd_body"],
     ".active": ["rosbag1", "graph"],
-    ".mcap": ["mcap", "verify", "graph"],
-    ".db3": ["sqlite3", "verify", "graph"],
+    ".mcap": ["mcap", "verify", "graph", "zstd_body"],
+    ".db3": ["sqlite3", "verify", "graph", "zstd_body"],
     ".zstd": ["zstd"],
     ".launch": ["topology_launch"],
     ".dot": ["topology_dot"],

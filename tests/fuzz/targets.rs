@@ -8,7 +8,7 @@ use bagreel::internals::draw::style::Style;
 use bagreel::internals::evidence::topology;
 use bagreel::internals::mission::read_json;
 use bagreel_fuzz::{
-    as_file, damage, damage_packed, outputs, read_bag, read_graphs, read_message, several,
+    as_file, damage, damage_packed, outputs, packed, read_bag, read_graphs, read_message, several,
 };
 use libfuzzer_sys::fuzz_target;
 
@@ -20,6 +20,7 @@ const TARGETS: &[(&str, Target)] = &[
     ("mcap", |bytes| as_file("x.mcap", bytes, |path| read_bag(path, false))),
     ("sqlite3", |bytes| as_file("x.db3", bytes, |path| read_bag(path, false))),
     ("zstd", |bytes| as_file("x.mcap.zstd", bytes, |path| read_bag(path, false))),
+    ("zstd_body", |bytes| as_file("x.zstd", &packed(bytes), |path| read_bag(path, false))),
     ("verify", |bytes| as_file("x", bytes, |path| read_bag(path, true))),
     ("metadata", metadata),
     ("cursor_ros1", |bytes| read_message("ros1", b"", bytes)),

@@ -1,8 +1,7 @@
 //! A chunked bag record by record from the front: without an index, cut, still open, or from a pipe.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io;
-use std::marker::PhantomData;
+use std::io::{self, Read as _};
 use std::sync::Arc;
 
 use super::Grammar;
@@ -25,7 +24,7 @@ const STRIDE: usize = 64 * 1024;
 struct Early {
     runs: BTreeMap<u32, EarlyRun>,
     held: usize,
-    /// The connections of those of the last chunk.
+    /// The connections of those of the last chunk that no index record has yet.
     last: Vec<u32>,
 }
 
@@ -34,8 +33,8 @@ struct Early {
 struct EarlyRun {
     stamps: Vec<Stamp>,
     sizes: Vec<u32>,
-    /// The number of those of the last chunk.
-    last: u64,
+    /// The number of those of the last chunk that no index record has stated yet.
+    last: usize,
 }
 
 /// The most early messages that are kept: 3 MB.
@@ -160,9 +159,16 @@ impl<G: Grammar> Walk<G> {
                 record => forward.record(stream, from, record),
             });
             at = if is_growing { at } else { stream.position() };
-            match step {
-                Err(NoRecord::Broken | NoRecord::Cut) if forward.resume(stream, from) => {}
-                step => step?,
+            let is_found = match step {
+                // Of a record that grows, only what follows it is whole.
+                Err(NoRecord::Cut) if is_growing => next_chunk::<G>(stream, from),
+                Err(NoRecord::Broken | NoRecord::Cut) => next_record::<G>(stream, from, u64::MAX),
+                _ => false,
+            };
+            if is_found {
+                forward.skipped(stream, from);
+            } else {
+                step?;
             }
             at = stream.position();
             forward.sink.progress(at, size);
@@ -302,16 +308,12 @@ impl<G: Grammar> Forward<'_, G> {
         Ok(())
     }
 
-    /// Skips bytes that are not a record, after byte `from` up to the next chunk; returns whether there is one.
-    fn resume(&mut self, stream: &mut ByteStream<'_>, from: u64) -> bool {
-        let found = next_chunk::<G>(stream, from);
-        if found {
-            let lost = stream.position() - from;
-            self.damage(&format!(
-                "skipped {lost} bytes at byte {from} that are not records"
-            ));
-        }
-        found
+    /// Reports the bytes from `from` on, which are not records.
+    fn skipped(&mut self, stream: &ByteStream<'_>, from: u64) {
+        let lost = stream.position() - from;
+        self.damage(&format!(
+            "skipped {lost} bytes at byte {from} that are not records"
+        ));
     }
 
     /// Reads a chunk whose record began at byte `from`.
@@ -346,13 +348,13 @@ impl<G: Grammar> Forward<'_, G> {
 
     /// Reads a compressed chunk without a length: the last one, which was never closed, unless another follows.
     fn unclosed(&mut self, stream: &mut ByteStream<'_>, how: Compression) -> Result<(), NoRecord> {
-        let mut body = BeforeChunk::<G>::new(stream);
+        let mut body = Before::new(stream, G::is_chunk);
         let read = match self.walk.allowance.open(how, &mut body) {
             Ok(reader) => records(&mut ByteStream::of_reader(reader), u64::MAX, self),
             Err(e) => Err(NoRecord::Io(e)),
         };
         let behind = io::copy(&mut body, &mut io::sink())?;
-        let is_followed = body.is_at_chunk;
+        let is_followed = body.is_there;
         if behind > 0 || is_followed {
             self.damage("a chunk has no length, and more follows it");
         }
@@ -377,7 +379,7 @@ impl<G: Grammar> Forward<'_, G> {
             G::index_stamps(peek_whole(stream, len)?)
         };
         let Some((id, _)) = self.walk.announced.get(raw) else {
-            let lost = self.walk.early.index(raw, u64::from(count), &stamps);
+            let lost = self.walk.early.index(raw, count, &stamps);
             absent(self.sink, lost);
             return pass(stream, len);
         };
@@ -476,44 +478,60 @@ fn is_other(stream: &mut ByteStream<'_>, crc: Option<u32>) -> bool {
 
 /// Goes to the beginning of the next chunk after byte `from`; false if there is none before the end of the stream.
 pub(super) fn next_chunk<G: Grammar>(stream: &mut ByteStream<'_>, from: u64) -> bool {
+    next(stream, (from, u64::MAX), G::is_chunk)
+}
+
+/// As [`next_chunk`], for a chunk, a message or a description, before byte `end`.
+pub(super) fn next_record<G: Grammar>(stream: &mut ByteStream<'_>, from: u64, end: u64) -> bool {
+    next(stream, (from, end), |bytes| {
+        G::is_chunk(bytes) || G::is_content(bytes)
+    })
+}
+
+fn next(
+    stream: &mut ByteStream<'_>,
+    (from, end): (u64, u64),
+    is_wanted: fn(&[u8]) -> bool,
+) -> bool {
     if stream.position() <= from && !matches!(stream.skip(1), Ok(1)) {
         return false;
     }
-    let mut before = BeforeChunk::<G>::new(stream);
+    let left = end.saturating_sub(stream.position());
+    let mut before = Before::new(stream, is_wanted);
     // An error of reading ends the search; the walk meets it again.
-    let _ = io::copy(&mut before, &mut io::sink());
-    before.is_at_chunk
+    let _ = io::copy(&mut before.by_ref().take(left), &mut io::sink());
+    before.is_there && before.free == 0
 }
 
-/// The bytes of a stream up to the next chunk.
-struct BeforeChunk<'a, 'b, G> {
+/// The bytes of a stream before the next record that is wanted.
+struct Before<'a, 'b> {
     stream: &'a mut ByteStream<'b>,
-    /// The number of next bytes at which no chunk begins.
+    is_wanted: fn(&[u8]) -> bool,
+    /// The number of next bytes at which none begins.
     free: usize,
-    /// Whether a chunk begins behind them.
-    is_at_chunk: bool,
-    grammar: PhantomData<fn() -> G>,
+    /// Whether one begins behind them.
+    is_there: bool,
 }
 
-impl<'a, 'b, G: Grammar> BeforeChunk<'a, 'b, G> {
-    fn new(stream: &'a mut ByteStream<'b>) -> Self {
+impl<'a, 'b> Before<'a, 'b> {
+    fn new(stream: &'a mut ByteStream<'b>, is_wanted: fn(&[u8]) -> bool) -> Self {
         Self {
             stream,
+            is_wanted,
             free: 0,
-            is_at_chunk: false,
-            grammar: PhantomData,
+            is_there: false,
         }
     }
 }
 
-impl<G: Grammar> io::Read for BeforeChunk<'_, '_, G> {
+impl io::Read for Before<'_, '_> {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        if self.free == 0 && !self.is_at_chunk {
+        if self.free == 0 && !self.is_there {
             let window = self.stream.peek(2 * STRIDE)?;
             let searched = window.len().min(STRIDE);
-            let chunk = (0..searched).find(|at| G::is_chunk(&window[*at..]));
-            self.is_at_chunk = chunk.is_some();
-            self.free = chunk.unwrap_or(searched);
+            let found = (0..searched).find(|at| (self.is_wanted)(&window[*at..]));
+            self.is_there = found.is_some();
+            self.free = found.unwrap_or(searched);
         }
         let most = into.len().min(self.free);
         let read = self.stream.read(&mut into[..most])?;
@@ -523,12 +541,13 @@ impl<G: Grammar> io::Read for BeforeChunk<'_, '_, G> {
 }
 
 impl Early {
-    /// Drops as many messages of the last chunk, since its index has them under other numbers.
-    fn take_back(&mut self, many: u64) {
-        for (raw, behind) in self.last.drain(..).rev().zip(0..) {
-            if let Some(run) = self.runs.get_mut(&raw) {
-                run.last = 0;
-                if behind < many {
+    /// Drops as many messages of the last chunk that no index record has stated, since its index has them under other numbers.
+    fn take_back(&mut self, mut many: u64) {
+        for raw in self.last.drain(..).rev() {
+            if let Some(run) = self.runs.get_mut(&raw).filter(|run| run.last > 0) {
+                run.last -= 1;
+                if many > 0 {
+                    many -= 1;
                     run.stamps.pop();
                     run.sizes.pop();
                 }
@@ -536,14 +555,24 @@ impl Early {
         }
     }
 
-    /// Takes an index record of the last chunk; returns the number of messages that the chunk lacks.
-    fn index(&mut self, raw: u32, count: u64, stamps: &[Stamp]) -> u64 {
-        let found = self.runs.get(&raw).map_or(0, |run| run.last);
-        if found == 0 && self.held < MOST_EARLY {
-            self.held += stamps.len();
-            self.runs.entry(raw).or_default().stamps.extend(stamps);
+    /// Takes an index record of the last chunk, which replaces the messages found in it if it has more; returns how many more.
+    fn index(&mut self, raw: u32, count: u32, stamps: &[Stamp]) -> u64 {
+        let count = count as usize;
+        let run = self.runs.get_mut(&raw);
+        let found = run.map_or(0, |run| {
+            let stated = run.last.min(count);
+            run.last -= stated;
+            stated
+        });
+        if count > found && stamps.len() == count && self.held < MOST_EARLY {
+            self.held += count;
+            let run = self.runs.entry(raw).or_default();
+            let before = run.stamps.len().saturating_sub(found);
+            run.stamps.truncate(before);
+            run.sizes.truncate(before);
+            run.stamps.extend(stamps);
         }
-        count.saturating_sub(found)
+        (count - found) as u64
     }
 
     fn hold(&mut self, raw: u32, time: Stamp, size: u32) {

@@ -3,8 +3,9 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
+use super::Grammar;
 use super::index::IndexSum;
-use super::record::Connections;
+use super::record::{Connections, NoRecord};
 use crate::bag::adapters::Bounds;
 use crate::bag::model::Sink;
 use crate::base::time::{Span, Stamp};
@@ -130,9 +131,86 @@ impl Unindexed {
     }
 }
 
+/// The part of a tail that has been read.
+#[derive(Default)]
+pub(crate) struct Tail<G> {
+    pub(crate) plan: ChunkPlan,
+    pub(crate) grammar: G,
+    used: Used,
+}
+
+impl<G: Grammar> Tail<G> {
+    /// Adds the connection that a record describes, if it is a new one.
+    ///
+    /// # Errors
+    /// As [`Grammar::describe`].
+    pub(crate) fn describe(&mut self, what: &G::Description, data: &[u8]) -> Result<(), NoRecord> {
+        let connections = &mut self.plan.connections;
+        if let Some((raw, connection)) = self.grammar.describe(what, data, connections)? {
+            connections.add(raw, connection);
+        }
+        Ok(())
+    }
+
+    /// Adds a chunk at byte `start` whose first and last message have these `times`, of which `counts` are the numbers of
+    /// messages by connection, `None` if they are not stated. Its index is at the bytes `index`.
+    ///
+    /// # Errors
+    /// If there are too many chunks.
+    pub(crate) fn list(
+        &mut self,
+        (start, index): (u64, Range<u64>),
+        (first, last): (Stamp, Stamp),
+        counts: Option<Vec<(u32, u32)>>,
+    ) -> Result<(), NoRecord> {
+        if self.plan.chunks.len() >= MOST_CHUNKS {
+            return Err(NoRecord::Broken);
+        }
+        let promised = counts.map(|counts| {
+            let mut sum = IndexSum::default();
+            for (raw, count) in counts {
+                sum.add(raw, count);
+                if count > 0 {
+                    self.used.add(raw);
+                }
+            }
+            sum
+        });
+        self.plan.chunks.push(Chunk {
+            start,
+            end: index.end,
+            index,
+            first,
+            last,
+            promised,
+            seen: None,
+        });
+        Ok(())
+    }
+
+    /// Puts the chunks into the order of the file, each once.
+    pub(crate) fn sort(&mut self) {
+        self.plan.chunks.sort_by_key(|chunk| chunk.start);
+        self.plan.chunks.dedup_by_key(|chunk| chunk.start);
+    }
+
+    /// Checks that all connections are described of which chunks are stated to contain messages. If not, the chunks themselves
+    /// may describe the others.
+    pub(crate) fn is_described(&self) -> Result<(), Unindexed> {
+        let small = (0..).zip(&self.used.small).filter(|(_, used)| **used);
+        let mut all = small
+            .map(|(raw, _)| raw)
+            .chain(self.used.large.iter().copied());
+        if all.all(|raw| self.plan.connections.get(raw).is_some()) {
+            return Ok(());
+        }
+        Unindexed::wrong("its index counts messages of undescribed connections")
+    }
+}
+
 /// The numbers of the connections that chunks are stated to contain.
 #[derive(Default)]
-pub(crate) struct Used {
+struct Used {
     /// Flags by number, up to the largest that real bags use.
     small: Vec<bool>,
     large: BTreeSet<u32>,
@@ -143,7 +221,7 @@ const SMALL: usize = 1 << 16;
 
 impl Used {
     /// Adds the number of a connection.
-    pub(crate) fn add(&mut self, raw: u32) {
+    fn add(&mut self, raw: u32) {
         let at = raw as usize;
         if at >= SMALL {
             self.large.insert(raw);
@@ -153,15 +231,5 @@ impl Used {
             self.small.resize(at + 1, false);
         }
         self.small[at] = true;
-    }
-
-    /// Checks that all of them are described. If not, the chunks themselves may describe the others.
-    pub(crate) fn are_in(&self, connections: &Connections) -> Result<(), Unindexed> {
-        let small = (0..).zip(&self.small).filter(|(_, used)| **used);
-        let mut all = small.map(|(raw, _)| raw).chain(self.large.iter().copied());
-        if all.all(|raw| connections.get(raw).is_some()) {
-            return Ok(());
-        }
-        Unindexed::wrong("its index counts messages of undescribed connections")
     }
 }

@@ -4,6 +4,7 @@ use std::io::Read;
 use std::sync::Arc;
 
 use super::Grammar;
+use super::forward::next_record;
 use super::record::{ChunkHead, NoRecord, RecordHead, pass, walk};
 use crate::bag::checksum::CrcReader;
 use crate::bag::decompress::{Allowance, Compression};
@@ -115,19 +116,31 @@ pub(super) fn records<G: Grammar>(
 ) -> Result<(), NoRecord> {
     let mut is_odd = false;
     let stop = walk(stream, end, |stream| {
-        let record = G::next(stream)?;
-        if record.len() > end.saturating_sub(stream.position()) {
-            // A length that exceeds the chunk is invalid.
-            return Err(NoRecord::Broken);
-        }
-        match record {
-            RecordHead::Message { raw, time, size } => visitor.message(stream, (raw, time, size)),
-            RecordHead::Description { what, len } => visitor.description(stream, &what, len),
-            odd => {
-                is_odd = true;
-                pass(stream, odd.len())
+        let from = stream.position();
+        let step = G::next(stream).and_then(|record| {
+            let is_open = end == u64::MAX;
+            let left = end.saturating_sub(stream.position());
+            if record.len() > left || is_open && !stream.has(record.len())? {
+                // A length that exceeds the chunk is invalid.
+                return Err(NoRecord::Broken);
             }
+            match record {
+                RecordHead::Message { raw, time, size } => {
+                    visitor.message(stream, (raw, time, size))
+                }
+                RecordHead::Description { what, len } => visitor.description(stream, &what, len),
+                odd => {
+                    is_odd = true;
+                    pass(stream, odd.len())
+                }
+            }
+        });
+        let is_broken = matches!(step, Err(NoRecord::Broken));
+        if is_broken && next_record::<G>(stream, from, end) {
+            is_odd = true;
+            return Ok(());
         }
+        step
     });
     match stop {
         NoRecord::End if is_odd => Err(NoRecord::Broken),

@@ -21,6 +21,8 @@ use crate::base::time::Stamp;
 pub(super) const HEAD: u64 = 9;
 /// The number of bytes of a message before its payload.
 const MESSAGE_HEAD: usize = 22;
+/// The number of bytes of a schema without any text, the shortest record that is looked for.
+const SHORTEST: usize = 2 + 4 + 4 + 4;
 /// The number of bytes of an entry of a message index: time and offset.
 pub(super) const ENTRY: usize = 16;
 /// The lengths of a footer and of a data end record, which distinguish them from records with a damaged kind.
@@ -267,6 +269,29 @@ pub(super) fn is_chunk(bytes: &[u8]) -> bool {
     }
     let mut cursor = FieldCursor(&bytes[1..]);
     cursor.u64().is_some_and(|len| is_chunk_of(cursor.0, len))
+}
+
+/// Whether a message, schema or channel begins here, which another record or the end of the bytes follows.
+pub(super) fn is_content(bytes: &[u8]) -> bool {
+    let record = |bytes| {
+        let mut cursor = FieldCursor(bytes);
+        let kind = cursor
+            .u8()
+            .filter(|kind| (1..=op::DATA_END).contains(kind))?;
+        let len = u32::try_from(cursor.u64()?).ok()?;
+        Some((kind, len as usize, cursor.0))
+    };
+    let Some((kind, len, content)) = record(bytes) else {
+        return false;
+    };
+    let is_kept = match kind {
+        // Its time is known: among small numbers, zeros follow.
+        op::MESSAGE => content.get(6..14).is_some_and(|time| time != [0; 8]),
+        kind => matches!(kind, op::SCHEMA | op::CHANNEL),
+    };
+    let next = content.get(len..);
+    let is_followed = next.is_some_and(|next| next.is_empty() || record(next).is_some());
+    is_kept && len >= SHORTEST && is_followed
 }
 
 /// Whether a record of `len` bytes that begins like this is a chunk: its two lengths agree.

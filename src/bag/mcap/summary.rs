@@ -1,6 +1,7 @@
 //! The summary at the end of an MCAP file: its channels and chunks, and whether they are reliable.
 
 use std::io;
+use std::ops::Range;
 
 use mcap::MAGIC;
 use mcap::records::op;
@@ -9,8 +10,7 @@ use super::records::{self, DATA_END, ENTRY, FOOTER, FieldCursor, HEAD};
 use super::{Described, Mcap};
 use crate::bag::checksum::CrcReader;
 use crate::bag::chunked::{
-    Chunk, ChunkPlan, Counts, Grammar as _, IndexSum, MOST_CHUNKS, NoRecord, RecordHead, Unindexed,
-    Used, pass, walk,
+    Chunk, ChunkPlan, Counts, Grammar as _, NoRecord, RecordHead, Tail, Unindexed, pass, walk,
 };
 use crate::bag::model::MOST_PAYLOAD;
 use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
@@ -26,7 +26,7 @@ pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexe
         Err(reason) => return Ok(Err(reason)),
     };
     let mut summary = Summary::default();
-    summary.plan.body = MAGIC.len() as u64..start;
+    summary.tail.plan.body = MAGIC.len() as u64..start;
     let end = source.len() - CRC_AND_CLOSING;
     let mut bytes = CrcReader::new(ByteStream::of_file(source, start, end, FAR));
     let read = summary.records(&mut ByteStream::of_reader(&mut bytes));
@@ -93,9 +93,7 @@ pub(super) fn data_crc(source: &FileSource) -> io::Result<Option<u32>> {
 /// The part of a summary that has been read.
 #[derive(Default)]
 struct Summary {
-    plan: ChunkPlan,
-    grammar: Mcap,
-    used: Used,
+    tail: Tail<Mcap>,
     statistics: Option<Counts>,
     /// Whether a channel refers to a schema that the summary does not repeat.
     untyped: bool,
@@ -121,16 +119,13 @@ impl Summary {
                 return Err(NoRecord::Cut);
             }
             match kind {
-                op::SCHEMA => records::schema(&mut self.grammar, record).ok_or(NoRecord::Broken)?,
+                op::SCHEMA => self.tail.describe(&Described::Schema, record)?,
                 // A channel may precede its schema.
                 op::CHANNEL if channels.len() < MOST_CHANNELS => channels.push(record.to_vec()),
                 op::STATISTICS => self.statistics = records::counts(record),
                 op::CHUNK_INDEX => {
-                    if self.plan.chunks.len() >= MOST_CHUNKS {
-                        return Err(NoRecord::Broken);
-                    }
-                    let chunk = chunk_index(record, &mut self.used).ok_or(NoRecord::Broken)?;
-                    self.plan.chunks.push(chunk);
+                    let (place, times, counts) = chunk_index(record).ok_or(NoRecord::Broken)?;
+                    self.tail.list(place, times, counts)?;
                 }
                 _ => {}
             }
@@ -142,23 +137,16 @@ impl Summary {
         for channel in &channels {
             let schema = channel.get(2..4).map(FieldCursor);
             let schema = schema.and_then(|mut id| id.u16()).unwrap_or(0);
-            self.untyped |= schema > 0 && !self.grammar.schemas.contains_key(&schema);
-            let connections = &mut self.plan.connections;
-            let described = self
-                .grammar
-                .describe(&Described::Channel, channel, connections)?;
-            if let Some((raw, connection)) = described {
-                connections.add(raw, connection);
-            }
+            self.untyped |= schema > 0 && !self.tail.grammar.schemas.contains_key(&schema);
+            self.tail.describe(&Described::Channel, channel)?;
         }
         Ok(())
     }
 
     /// Sorts the chunks and decides whether they contain all messages. Every part of a summary is optional.
     fn into_plan(mut self, source: &FileSource) -> Result<ChunkPlan, Unindexed> {
-        let chunks = &mut self.plan.chunks;
-        chunks.sort_by_key(|c| c.start);
-        chunks.dedup_by_key(|c| c.start);
+        self.tail.sort();
+        let chunks = &self.tail.plan.chunks;
         let promised = chunks.iter().filter_map(|c| Some(c.promised?.messages));
         let known: u64 = promised.sum();
         let Some(all) = &self.statistics else {
@@ -175,17 +163,17 @@ impl Summary {
         }
         if all.messages != known {
             are_counted(source, chunks)?;
-            gaps(source, &self.plan)?;
+            gaps(source, &self.tail.plan)?;
             return Unindexed::wrong("its index and its statistics disagree");
         }
-        let undescribed = self.used.are_in(&self.plan.connections);
-        let described = self.plan.connections.list().len();
+        let undescribed = self.tail.is_described();
+        let described = self.tail.plan.connections.list().len();
         if self.untyped || undescribed.is_err() && described < all.channels as usize {
             return Unindexed::missing("its summary does not repeat all channels and schemas");
         }
         undescribed?;
-        gaps(source, &self.plan)?;
-        Ok(self.plan)
+        gaps(source, &self.tail.plan)?;
+        Ok(self.tail.plan)
     }
 }
 
@@ -237,8 +225,11 @@ fn gaps(source: &FileSource, plan: &ChunkPlan) -> Result<(), Unindexed> {
     Ok(())
 }
 
+/// The places of a chunk and its index, its times and its message counts in a chunk index record.
+type Listed = ((u64, Range<u64>), (Stamp, Stamp), Option<Vec<(u32, u32)>>);
+
 /// The chunk of a chunk index record.
-fn chunk_index(record: &[u8], used: &mut Used) -> Option<Chunk> {
+fn chunk_index(record: &[u8]) -> Option<Listed> {
     let mut cursor = FieldCursor(record);
     let (first, last) = (cursor.u64()?, cursor.u64()?);
     let (start, len) = (cursor.u64()?, cursor.u64()?);
@@ -251,16 +242,8 @@ fn chunk_index(record: &[u8], used: &mut Used) -> Option<Chunk> {
     if len < HEAD {
         return None;
     }
-    let counts = counts(offsets, behind, end);
-    Some(Chunk {
-        start,
-        index: behind..end,
-        end,
-        first: Stamp::from_nanos(first),
-        last: Stamp::from_nanos(last),
-        promised: counts.map(|counts| promised(&counts, used)),
-        seen: None,
-    })
+    let times = (Stamp::from_nanos(first), Stamp::from_nanos(last));
+    Some(((start, behind..end), times, counts(offsets, behind, end)))
 }
 
 /// The message counts, computed from the offsets of the message indexes of a chunk's channels, which are contiguous:
@@ -282,16 +265,4 @@ fn counts(offsets: &[u8], start: u64, end: u64) -> Option<Vec<(u32, u32)>> {
         (entries % 16 == 0).then_some((u32::from(*channel), count))
     };
     places.iter().zip(ends).map(count).collect()
-}
-
-/// The expected sum of the index.
-fn promised(counts: &[(u32, u32)], used: &mut Used) -> IndexSum {
-    let mut sum = IndexSum::default();
-    for (channel, count) in counts {
-        sum.add(*channel, *count);
-        if *count > 0 {
-            used.add(*channel);
-        }
-    }
-    sum
 }

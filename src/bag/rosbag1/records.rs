@@ -122,6 +122,15 @@ pub(super) fn header(stream: &mut ByteStream<'_>) -> Result<(Header, u32), NoRec
     Ok((record, data_len))
 }
 
+/// The header of the record that begins here, and the number of its bytes; `None` unless it is of a usual length: 40 to 60
+/// bytes, more with a long topic. Tested at every byte.
+pub(super) fn short(bytes: &[u8]) -> Option<(Header, usize)> {
+    let len = u32_at(bytes, 0).filter(|n| (20..300).contains(n))? as usize;
+    let header = parse(bytes.get(4..4 + len)?).filter(|header| *header != Header::Unknown)?;
+    let data = u32_at(bytes, 4 + len)? as usize;
+    Some((header, 8 + len + data))
+}
+
 /// The number of bytes of an entry of an index record: time and offset.
 pub(super) const ENTRY: u32 = 12;
 

@@ -1,6 +1,5 @@
 //! Reads a ROS 1 bag again with an independent reader, the crate `rosbag`, after checking the bounds of every chunk.
 
-use std::io;
 use std::sync::Arc;
 
 use rosbag::{ChunkRecord, IndexRecord, MessageRecord, RosBag};
@@ -75,7 +74,12 @@ fn bound_chunk(
     size: u32,
     allowance: &Arc<Allowance>,
 ) -> Result<(), String> {
-    let unpacked = unpacked_len(source, body, size, allowance);
+    let unpacked = body
+        .plain(source, FAR, allowance)
+        .and_then(|(mut plain, base)| {
+            plain.skip(u64::from(size) + 1)?;
+            Ok(plain.position() - base)
+        });
     let unpacked = unpacked.map_err(|e| format!("a chunk cannot be decompressed: {e}"))?;
     if unpacked != u64::from(size) || size > LARGEST_CHUNK {
         return Err(format!(
@@ -83,18 +87,6 @@ fn bound_chunk(
         ));
     }
     Ok(())
-}
-
-/// The length of a chunk when unpacked; at most one more than `most`.
-fn unpacked_len(
-    source: &FileSource,
-    body: &ChunkBody,
-    most: u32,
-    allowance: &Arc<Allowance>,
-) -> io::Result<u64> {
-    let (mut plain, base) = body.plain(source, FAR, allowance)?;
-    plain.skip(u64::from(most) + 1)?;
-    Ok(plain.position() - base)
 }
 
 fn records_of(bag: &RosBag, to: &mut SecondFinds<'_, Rosbag1>) -> Result<(), String> {

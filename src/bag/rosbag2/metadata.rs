@@ -50,21 +50,12 @@ fn understand(root: &Value) -> Metadata {
     let files = root.get("relative_file_paths").and_then(Value::as_array);
     let names = files.into_iter().flatten().filter_map(Value::as_str);
     metadata.files = names.map(str::to_owned).collect();
-    for name in [
-        "version",
-        "storage_identifier",
-        "ros_distro",
-        "compression_mode",
-    ] {
-        let text = match root.get(name) {
+    let own = ["storage_identifier", "ros_distro", "compression_mode"].map(|key| (key, key));
+    for (key, name) in [("version", "metadata_version")].into_iter().chain(own) {
+        let text = match root.get(key) {
             Some(Value::String(text)) if !text.is_empty() => text.clone(),
             Some(Value::Number(number)) => number.to_string(),
             _ => continue,
-        };
-        let name = if name == "version" {
-            "metadata_version"
-        } else {
-            name
         };
         metadata.facts.push((name.to_owned(), text));
     }

@@ -7,7 +7,7 @@ use super::Sqlite3Bag;
 use super::db::{Db, QueryRow, Refusal};
 use crate::bag::adapters::Gather;
 use crate::bag::decompress::{Allowance, zstd_payload};
-use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want};
+use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want, damaged};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
 
@@ -82,11 +82,8 @@ impl RowReading<'_, '_> {
                 Err(refusal) => refusal,
             };
             let before = self.left;
-            let bare = format!(
-                "{} ORDER BY rowid{} LIMIT 1",
-                self.rows.bare,
-                if way == Direction::Up { "" } else { " DESC" }
-            );
+            let end = if way == Direction::Up { "ASC" } else { "DESC" };
+            let bare = format!("{} ORDER BY rowid {end} LIMIT 1", self.rows.bare);
             let again = self.lost.payloads < MOST_RETRIES && self.some(&db, &bare, way).is_ok();
             if !again || self.left == before {
                 return Err(refusal.to_string());
@@ -168,8 +165,7 @@ impl<'a> RowReader<'a> {
         reading.gather.flush(reading.sink);
         reading.lost.report(reading.sink);
         if let Err(e) = result {
-            let text = format!("rows could not be read: {e}");
-            sink.notice(Notice::new(NoticeKind::Damaged, text));
+            damaged(sink, 1, &format!("rows could not be read: {e}"));
         }
     }
 
@@ -273,21 +269,14 @@ fn report_payload(
 
 impl LostRows {
     fn report(&self, sink: &mut dyn Sink) {
-        use NoticeKind::{Damaged, Note};
         let orphans = "rows belong to a topic that the bag does not name";
-        let unused = "rows are missing among the others: deleted, or lost by damage";
-        let kinds = [
-            (Damaged, self.orphans, orphans),
-            (Damaged, self.odd, "rows have no topic or no time"),
-            (
-                Damaged,
-                self.payloads,
-                "rows were counted but could not be read",
-            ),
-            (Note, self.unused, unused),
-        ];
-        for (kind, count, text) in kinds.into_iter().filter(|(_, count, _)| *count > 0) {
-            sink.notice(Notice::counted(kind, count, text));
+        damaged(sink, self.orphans, orphans);
+        damaged(sink, self.odd, "rows have no topic or no time");
+        let unread = "rows were counted but could not be read";
+        damaged(sink, self.payloads, unread);
+        if self.unused > 0 {
+            let text = "rows are missing among the others: deleted, or lost by damage";
+            sink.notice(Notice::counted(NoticeKind::Note, self.unused, text));
         }
     }
 }
