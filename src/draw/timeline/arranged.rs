@@ -47,6 +47,11 @@ pub(crate) fn by_namespace(rows: Vec<Row>, whole: Span, is_folded: bool) -> Vec<
     spaces.sort_by_key(|(space, own)| (space != "/", start(own)));
     // If all others are written with their namespaces, a title of those at the root says nothing.
     let is_flat = (spaces.iter()).all(|(space, own)| space == "/" || own.len() == 1);
+    let level = if is_flat {
+        Level::Outside
+    } else {
+        Level::Inside
+    };
     let mut all = Vec::new();
     for (space, mut own) in spaces {
         if let [only] = &mut own[..] {
@@ -55,9 +60,7 @@ pub(crate) fn by_namespace(rows: Vec<Row>, whole: Span, is_folded: bool) -> Vec<
             continue;
         }
         for row in &mut own {
-            if !is_flat {
-                row.level = Level::Inside;
-            }
+            row.level = level;
             row.labels = vec![last_part(&row.name).to_owned()];
         }
         if !is_flat {
@@ -72,7 +75,8 @@ pub(crate) fn by_namespace(rows: Vec<Row>, whole: Span, is_folded: bool) -> Vec<
         // If nothing else is shown, a few rows are more informative than their number.
         let is_all = fixed.len() == many && many <= MOST_OPEN;
         if is_folded && fixed.len() >= FEWEST_FOLDED && !is_all {
-            all.push(folded(fixed, whole));
+            let folded = folded(fixed, whole);
+            all.push(Row { level, ..folded });
             all.extend(staircase(open, whole));
         } else {
             all.extend(staircase([fixed, open].concat(), whole));
@@ -96,11 +100,8 @@ pub(crate) fn numbered(rows: Vec<Row>, whole: Span) -> Vec<Row> {
     for alike in rows.chunk_by(|a, b| a.0 == b.0 && a.2.is_like(&b.2, near)) {
         match alike {
             [(stem, Some(first), row), .., (_, Some(last), _)] if alike.len() >= FEWEST_FOLDED => {
-                let name = format!("{stem}{first}…{last} ×{}", alike.len()).into();
-                let mut one = Row {
-                    name,
-                    ..row.clone()
-                };
+                let mut one = row.clone();
+                one.name = format!("{stem}{first}…{last} ×{}", alike.len()).into();
                 for (.., other) in &alike[1..] {
                     let marks = one.marks.iter_mut().zip(&other.marks);
                     marks.for_each(|(mark, other)| mark.events.extend_from_slice(&other.events));
@@ -115,7 +116,7 @@ pub(crate) fn numbered(rows: Vec<Row>, whole: Span) -> Vec<Row> {
 
 /// Whether a row exists from (nearly) the first moment to the last, without a gap or a step.
 fn is_throughout(row: &Row, whole: Span) -> bool {
-    let steady = row.topic.is_none() || row.bars.len() == 1;
+    let steady = row.topic.is_none() || row.hz.is_none() || row.bars.len() == 1;
     let start = row.start().since(whole.start);
     row.lives.len() == 1 && start <= whole.nanos() / 20 && steady
 }
@@ -130,7 +131,6 @@ fn folded(rows: Vec<Row>, whole: Span) -> Row {
     let beside = rows.iter().map(|row| last_part(&row.name).to_owned());
     Row {
         labels: vec![format!("{count} throughout")],
-        level: Level::Inside,
         lives: vec![whole],
         bars: vec![SendingBar::new(whole, 1.0)],
         hz: rows.iter().filter_map(|row| row.hz).reduce(|a, b| a + b),

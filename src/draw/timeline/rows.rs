@@ -10,7 +10,7 @@ use crate::base::name::namespace;
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::Confidence;
-use crate::graph::history::{Sender, Sending};
+use crate::graph::history::{Sender, Sending, Stretch};
 use crate::graph::{ById, EdgeId, Element, NodeId, TopicId};
 use crate::mission::rates::{Piece, Rates, silence, steps};
 
@@ -126,15 +126,12 @@ pub(crate) fn of_nodes(source: &FigureSource<'_>) -> Vec<Row> {
         let publications = source.publications(nodes);
         let elements: Vec<Element> = nodes.iter().map(|id| Element::Node(*id)).collect();
         let own = row(source, &rates, &elements, &rates.senders(&publications));
+        let sent = sent_by(source, &rates, &publications);
         Row {
             name: Arc::clone(role),
             nodes: nodes.clone(),
             beside: [
-                arrowed(
-                    "→",
-                    role,
-                    sent_by(source, &rates, &publications).into_iter(),
-                ),
+                arrowed("→", role, sent.into_iter()),
                 arrowed("←", role, nodes.iter().flat_map(|id| received[*id].clone())),
             ],
             ..own
@@ -179,8 +176,15 @@ fn row(
     let most = pieces.iter().map(|piece| piece.hz).fold(0.0, f64::max);
     let share = |hz: f64| if most > 0.0 { hz / most } else { 1.0 };
     let bar = |piece: &Piece| SendingBar::new(piece.span, share(piece.hz));
-    let mut bars: Vec<SendingBar> = pieces.iter().map(bar).collect();
-    if let (Some(life), Some(bar)) = (lives.last(), bars.last_mut())
+    let stretches = senders.iter().flat_map(|sender| &sender.stretches);
+    // The few messages of a sender without a rate are moments.
+    let moment = |at: Stamp| SendingBar::new(Span::new(at, at.plus(1)), 1.0);
+    let moments = |s: &Stretch| [s.first, s.last].map(moment);
+    let mut bars: Vec<SendingBar> = match hz {
+        Some(_) => pieces.iter().map(bar).collect(),
+        None => stretches.flat_map(moments).collect(),
+    };
+    if let (Some(life), Some(bar), Some(_)) = (lives.last(), bars.last_mut(), hz)
         && life.end.since(bar.span.end) <= silence(whole)
         && life.end == whole.end
     {

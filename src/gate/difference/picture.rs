@@ -413,8 +413,8 @@ pub(crate) fn pairs(
             let is_topic = pair.iter().any(|row| row.topic.is_some());
             let subjects = [("A", &subject.first), ("B", &subject.second)];
             for ((row, mission), (side, subject)) in pair.into_iter().zip(missions).zip(subjects) {
-                let hz = row.hz.unwrap_or(0.0);
-                let share = if most > 0.0 { hz / most } else { 1.0 };
+                let hz = row.hz.filter(|_| most > 0.0);
+                let share = hz.map_or(1.0, |hz| hz / most);
                 let node = drawn.elements.node(&name).filter(|_| !is_topic);
                 rows.push(Row {
                     labels: vec![format!("{side} {subject}")],
