@@ -137,7 +137,12 @@ fn why_begins_with_who_publishes_and_when() {
 #[test]
 fn why_of_a_role_explains_every_anonymous_node_of_it() {
     let names = ["/probe_9665_1795171273454", "/probe_9702_1795171300000"];
-    let bag = minute(&[(names[0], "/heat", 0, 20), (names[1], "/heat", 30, 60)]);
+    let mut bag = minute(&[(names[0], "/heat", 0, 20), (names[1], "/heat", 30, 60)]);
+    let log = bag.publisher(names[0], "/rosout", "rosgraph_msgs/Log");
+    LOG.clone_into(&mut bag.publishers[log].definition);
+    let mut record = log1(names[0], "too hot", "probe.cpp", &["/heat"]);
+    record[16] = 4;
+    bag.send(log, (18_000, 18_001), 1, &record);
     let dir = tempfile::tempdir().unwrap();
     fs::write(dir.path().join("r.bag"), write(&bag, Pack::None, 20_000)).unwrap();
     for asked in ["/probe", "/probe /heat"] {
@@ -149,6 +154,16 @@ fn why_of_a_role_explains_every_anonymous_node_of_it() {
             _ => names.map(|name| format!("{name} publishes /heat")),
         };
         assert_eq!(titles, expected, "{text}");
+        // The one that went away logged why.
+        let lines: Vec<&str> = text.lines().map(str::trim).collect();
+        let restart = lines
+            .iter()
+            .position(|line| line.contains("/probe restarted"));
+        let warning = restart.and_then(|at| lines.get(at + 1));
+        assert!(
+            asked != "/probe" || warning == Some(&"00:18.0    WARN: too hot"),
+            "{text}"
+        );
         // Evidence is kept for all of them.
         for name in names {
             let of_name = text.lines().filter(|line| line.contains(name));

@@ -218,12 +218,6 @@ def embedded(b, url, topic_timeline):
     b.keys(" ")
     time.sleep(1.4)
     assert b.js("const s = document.getElementById('seek'); return +s.value < +s.max"), "it begins again"
-    low = dict(deviceScaleFactor=1, mobile=False)
-    b.cdp("Emulation.setDeviceMetricsOverride", width=830, height=260, **low)
-    time.sleep(0.3)
-    shown, whole = b.js("const p = document.getElementById('headline'); return [p.clientHeight, p.scrollHeight]")
-    assert shown >= whole > 9, f"of the headline, {shown} of {whole} pixels are visible"
-    b.cdp("Emulation.setDeviceMetricsOverride", width=1440, height=900, **low)
     print("  #bare&loop shows the picture alone, again and again")
 
 
@@ -262,7 +256,17 @@ def drive(b, url, topic_timeline, evolution):
     embedded(b, url, topic_timeline)
 
 
+def low(topic_timeline):
+    """In a low frame, rows give way, and not the headline."""
+    with Browser(830, 260) as b:
+        b.open(topic_timeline + "#bare")
+        time.sleep(0.3)
+        shown, whole = b.js("const p = document.getElementById('headline'); return [p.clientHeight, p.scrollHeight]")
+        assert shown >= whole > 9, f"of the headline, {shown} of {whole} pixels are visible"
+
+
 def check(url, topic_timeline, evolution):
+    low(topic_timeline)
     with Browser(1440, 900) as b:
         drive(b, url, topic_timeline, evolution)
         printed(b, url, topic_timeline)

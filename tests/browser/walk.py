@@ -1,9 +1,10 @@
 """Walks through the changes of any page on screens of three sizes: walk.py PAGE...
 
-Every change is visible after "next change", the place and the sentence agree, the list names every change once and in order of time,
-what can be read is 9 pixels high, nothing is wider than the screen, and the browser reports no error."""
+Every change is visible after "next change", the place and the sentence agree, the list names every change once, in order of time, and
+as many as the sentence counts, what can be read is 9 pixels high, nothing is wider than the screen, and the browser reports no error."""
 
 import pathlib
+import re
 import sys
 import time
 
@@ -34,6 +35,9 @@ def walk(b, name, wide):
     sentence = b.js("return document.getElementById('sentence').textContent")
     is_quiet = sentence.endswith("nothing changed")
     assert sentence and "None" not in sentence and is_quiet == (not rows), (name, sentence, len(rows))
+    counts = re.findall(r"(\d+) (?:change|interruption)s?\b", sentence.split(". ")[0])
+    listed = [row for row in rows if " is back " not in row[3]]
+    assert sum(map(int, counts)) == len(listed), (name, sentence, len(listed))
     b.keys(HOME)
     last, visited = b.js(SEEK), 0
     while visited < MOST:

@@ -64,9 +64,13 @@ pub(crate) fn summary(mission: &Mission, info: &Info) -> String {
         words::shorten(&format!("{at} {words}"), LONGEST).into_owned()
     });
     let moments: Vec<String> = moments.collect();
-    let many = match all.len() {
-        0 => at_times(mission) + "nothing changed",
-        many => words::count(many, "change"),
+    let counts = [
+        (all.len(), "change"),
+        (log.interruptions.len(), "interruption"),
+    ];
+    let many = match words::counted(&counts, words::count) {
+        none if none.is_empty() => at_times(mission) + "nothing changed",
+        some => some,
     };
     let first = format!("{}, {many}", contents(info));
     if moments.is_empty() {

@@ -206,8 +206,9 @@ fn happened(mission: &Mission, element: Element, pieces: &[EvidenceLine]) -> Vec
         let head = if is_first { heads.next() } else { None };
         lines.extend(head.map(|head| head.text(None).trim_end().to_owned()));
         if let (Element::Node(id), Kind::Stopped | Kind::Restarted) = (event.what, event.kind) {
-            let name = elements.nodes[id].name.as_str();
-            lines.extend(logged(mission, name, event.time, pieces));
+            // One that restarted under another name logged under its old one.
+            let role = &elements.nodes[id].role;
+            lines.extend(logged(mission, role, event.time, pieces));
         }
     }
     lines
@@ -229,13 +230,12 @@ fn when(mission: &Mission, what: Element) -> String {
 }
 
 /// The last warnings and errors that a node logged before an end; if it logs, and none of them, a line that says so.
-fn logged(mission: &Mission, name: &str, end: Stamp, pieces: &[EvidenceLine]) -> Vec<String> {
+fn logged(mission: &Mission, role: &str, end: Stamp, pieces: &[EvidenceLine]) -> Vec<String> {
     let mut logs = false;
     let own = pieces.iter().filter_map(|piece| {
         let (logger, text) = piece.text.split_once(" logs ")?;
-        let is_own = logger
-            .strip_prefix(name)
-            .is_some_and(|part| part.is_empty() || part.starts_with('/'));
+        let is_child = |part: &str| part.starts_with('/');
+        let is_own = is_named(logger, role) || logger.strip_prefix(role).is_some_and(is_child);
         logs |= is_own;
         let time = piece
             .time
