@@ -1,7 +1,7 @@
 //! The clocks of recorders: credible times, as a few messages far from all others were recorded with a clock that was not set;
 //! and the messages that several recorders have in common, which show by how much their clocks differ.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::io;
 
 use crate::base::budget;
@@ -9,6 +9,7 @@ use crate::base::ids::{ById, grouped};
 use crate::base::name::NodeName;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::GAP_NS;
+use crate::base::role::start;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::inference::Stream;
 use crate::evidence::observation::Observations;
@@ -195,8 +196,8 @@ pub(crate) struct ClockOffset {
     pub(crate) ahead: i64,
     /// The number of messages that show it.
     pub(crate) messages: usize,
-    /// Whether both recorded one robot: in wall time, with stamps or on several topics. In simulated time, two runs may have equal
-    /// messages at equal times.
+    /// Whether both recorded one robot: with stamps or on several topics, and in wall time or with a node of the same start in its name.
+    /// Otherwise two runs of a simulation may have equal messages at equal times.
     pub(crate) is_one_robot: bool,
 }
 
@@ -238,13 +239,26 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
             *time = time.filter(|(time, _)| *time == timed.time);
         })?;
     }
+    // No other run has a node with such a name.
+    let started = streams.iter().filter_map(|stream| {
+        let name = stream.connection.publisher.as_ref()?.as_str();
+        start(name).map(|_| (stream.bag, name))
+    });
+    let started: BTreeSet<(usize, &str)> = started.collect();
+    let is_one_run = |a, b| {
+        let names = started.range((a, "")..(a + 1, ""));
+        names
+            .into_iter()
+            .any(|(_, name)| started.contains(&(b, *name)))
+    };
     let filled = (0..bags.len()).filter(|bag| !bags[*bag].is_empty());
     let filled: Vec<usize> = filled.collect();
     let mut found = Vec::new();
     for (at, bag) in filled.iter().copied().enumerate() {
         let before = filled[..at].iter().copied();
         found.extend(before.filter_map(|other| {
-            let (ahead, messages, is_one_robot) = offset(&bags[other], &bags[bag])?;
+            let is_one_run = is_one_run(other, bag);
+            let (ahead, messages, is_one_robot) = offset(&bags[other], &bags[bag], is_one_run)?;
             Some(ClockOffset {
                 bag,
                 other,
@@ -257,48 +271,139 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
     Ok(found)
 }
 
-/// Whether a later part of a bag, between two times, repeats messages of the part before: at least half of what `is_again` says to be in both.
+/// The messages of one topic and publisher in a bag.
+struct Doubled {
+    /// The content of each message, by its hash, its time, and its stream; sorted.
+    messages: Vec<(u32, Stamp, usize)>,
+    /// The number of contents that are not constant: those of at most as many messages as there are recordings.
+    contents: usize,
+    /// The times between two messages of one such content.
+    lags: Vec<i64>,
+}
+
+/// The messages of a bag that are not latched, by topic and publisher.
+fn doubled(
+    streams: &[Stream],
+    facts: &Observations,
+    bag: usize,
+    recordings: usize,
+) -> io::Result<Vec<Doubled>> {
+    let all = facts
+        .payloads
+        .somes()
+        .map(|(at, own)| (at, &streams[at], *own));
+    let all = all.filter(|(_, stream, _)| stream.bag == bag && !stream.latched);
+    let all = all.map(|(at, stream, own)| ((stream.topic, stream.publisher), (at, own)));
+    let topics = grouped(all).into_values().map(|own| {
+        let (of, series): (Vec<usize>, Vec<_>) = own.into_iter().unzip();
+        let mut messages = Vec::new();
+        facts.times.merge(&series, |timed| {
+            messages.push((timed.size, timed.time, of[timed.series]))
+        })?;
+        messages.sort_unstable();
+        let (mut contents, mut lags) = (0, Vec::new());
+        for same in messages
+            .chunk_by(|a, b| a.0 == b.0)
+            .filter(|same| same.len() <= recordings)
+        {
+            contents += 1;
+            lags.extend(same.windows(2).map(|two| two[1].1.since(two[0].1)));
+        }
+        Ok(Doubled {
+            messages,
+            contents,
+            lags,
+        })
+    });
+    topics.collect()
+}
+
+/// The messages of a bag that repeat others, by stream and time, each as an interval, since the recordings of two recorders were merged: on more than two
+/// topics, and a quarter of all, most contents occur twice, with one difference of time. If a script appended one recording to another,
+/// time goes back in the file (`seams` times), and it is enough that messages of one topic were recorded again at once.
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
-pub(crate) fn repeats(
+pub(crate) fn merged(
     (streams, facts): (&[Stream], &Observations),
-    span: Span,
-    is_again: impl Fn(&Stream) -> bool,
-) -> io::Result<bool> {
-    let all = facts.payloads.somes();
-    let all = all.map(|(at, own)| (&streams[at], *own));
-    let all = all.filter(|(stream, _)| !stream.latched && is_again(stream));
-    let series = grouped(all.map(|(of, own)| ((of.topic, of.publisher), own)));
-    let (mut all, mut copies) = (0, 0);
-    for own in series.values() {
-        let mut contents = Vec::new();
-        facts.times.merge(own, |timed| {
-            contents.extend(
-                span.contains(timed.time)
-                    .then_some((timed.size, timed.time)),
-            );
-        })?;
-        contents.sort_unstable();
-        // What occurs more often is a constant.
-        let single = contents
-            .chunk_by(|a, b| a.0 == b.0)
-            .filter(|same| same.len() <= 2);
-        for same in single {
-            let is_near = same
-                .last()
-                .is_some_and(|last| last.1.since(same[0].1) <= NEAR_NS);
-            all += same.len();
-            copies += usize::from(is_near && same.len() == 2);
+    bag: usize,
+    seams: usize,
+) -> io::Result<Vec<(usize, Span)>> {
+    let all = doubled(streams, facts, bag, (seams + 1).max(2))?;
+    let mut topics: Vec<_> = all.iter().filter(|one| one.contents >= FEWEST).collect();
+    let many = topics.len();
+    topics.retain(|one| one.lags.len() >= FEWEST && one.lags.len() * 4 >= one.contents);
+    let mut lags: Vec<i64> = topics.iter().flat_map(|one| &one.lags).copied().collect();
+    lags.sort_unstable();
+    let Some(usual) = lags.get(lags.len() / 2) else {
+        return Ok(Vec::new());
+    };
+    let is_usual = |lag: i64| (lag - usual).abs() <= NEAR_NS;
+    topics.retain(|one| {
+        let near = one.lags.iter().filter(|lag| is_usual(**lag)).count();
+        near * 100 >= one.lags.len() * SHARE
+    });
+    let times = |one: &Doubled| {
+        let times = || one.messages.iter().map(|message| message.1);
+        times().min().zip(times().max())
+    };
+    let is_apart = |one: &&&Doubled| {
+        // A driver that sends each image twice does so half a period later.
+        let half = times(one).map_or(0, |(from, to)| to.since(from)) / 2 / one.contents as i64;
+        (usual - half).abs() > half / 5
+    };
+    let is_merged = if seams > 0 {
+        // Two runs of a simulation may have equal messages at equal times.
+        let is_set = |one: &&Doubled| times(one).is_some_and(|(from, _)| from.0 > UNSET_DAYS * DAY);
+        *usual <= NEAR_NS && topics.iter().all(is_set)
+    } else {
+        topics.iter().filter(is_apart).count() > TOPICS && topics.len() * 4 >= many
+    };
+    if !is_merged {
+        return Ok(Vec::new());
+    }
+    // The messages of a fast topic may be constant.
+    let mut late: Vec<i64> = lags.iter().map(|lag| (lag - usual).abs()).collect();
+    late.sort_unstable();
+    let near = (late[late.len() * 9 / 10] * 3).clamp(NEAR_NS / 50, NEAR_NS);
+    let mut again = Vec::new();
+    for same in all
+        .iter()
+        .flat_map(|one| one.messages.chunk_by(|a, b| a.0 == b.0))
+    {
+        // Those before that none repeats yet.
+        let mut first: VecDeque<Stamp> = VecDeque::new();
+        for (_, time, at) in same.iter().copied() {
+            while first
+                .front()
+                .is_some_and(|first| time.since(*first) > usual + near)
+            {
+                first.pop_front();
+            }
+            match first
+                .front()
+                .filter(|first| time.since(**first) >= usual - near)
+            {
+                Some(before) => {
+                    // Of two messages at one time, one stays.
+                    again.push((at, Span::new(time, time.plus(i64::from(*before < time)))));
+                    first.pop_front();
+                }
+                None => first.push_back(time),
+            }
         }
     }
-    let is_set = span.start.0 > UNSET_DAYS * DAY;
-    Ok(is_set && copies >= FEWEST && copies * 4 >= all)
+    again.sort_unstable_by_key(|(at, span)| (*at, span.start));
+    Ok(again)
 }
 
 /// The delay of the common messages in the second recording, their number, and whether both recorded one robot; `None` without
 /// agreement.
-fn offset(one: &Contents<'_>, other: &Contents<'_>) -> Option<(i64, usize, bool)> {
+fn offset(
+    one: &Contents<'_>,
+    other: &Contents<'_>,
+    is_one_run: bool,
+) -> Option<(i64, usize, bool)> {
     let both = other
         .iter()
         .filter_map(|(key, own)| Some((key.0, one.get(key)?, own)));
@@ -318,7 +423,7 @@ fn offset(one: &Contents<'_>, other: &Contents<'_>) -> Option<(i64, usize, bool)
     let times = [one, other].into_iter().flat_map(BTreeMap::values);
     let mut times = times.flat_map(BTreeMap::values).flatten();
     let is_set = times.all(|(time, _)| time.0 > UNSET_DAYS * DAY);
-    let is_one_robot = is_set && (is_stamped || topics.len() > TOPICS);
+    let is_one_robot = (is_set || is_one_run) && (is_stamped || topics.len() > TOPICS);
     let is_clear = agreeing >= FEWEST && agreeing * 100 >= lags.len() * SHARE;
     (is_clear && (is_stamped || topics.len() >= TOPICS)).then_some((median, agreeing, is_one_robot))
 }
@@ -448,21 +553,24 @@ mod tests {
             let one: Vec<i64> = (0..20).map(|n| n * 100).collect();
             let later: Vec<i64> = one.iter().map(|t| t + 350 + t % 7).collect();
             let plain = |times: &[i64]| contents(times, false);
-            let (ahead, messages, _) = offset(&plain(&one), &plain(&later)).unwrap();
+            let (ahead, messages, _) = offset(&plain(&one), &plain(&later), false).unwrap();
             assert_eq!((ahead / 10_000_000, messages), (35, 20));
             let wild: Vec<i64> = one.iter().map(|t| t * 2).collect();
-            assert_eq!(offset(&plain(&one), &plain(&wild)), None);
-            assert_eq!(offset(&plain(&one[..5]), &plain(&later)), None);
+            assert_eq!(offset(&plain(&one), &plain(&wild), false), None);
+            assert_eq!(offset(&plain(&one[..5]), &plain(&later), false), None);
             let only = |times: &[i64], stamped| {
                 let mut all = contents(times, stamped);
                 all.retain(|key, _| key.0 == "/tf");
                 all
             };
-            let found = offset(&only(&one, false), &only(&later, false));
+            let found = offset(&only(&one, false), &only(&later, false), false);
             assert_eq!(found, None);
-            let found = offset(&only(&one, true), &only(&later, true)).unwrap();
+            let found = offset(&only(&one, true), &only(&later, true), false).unwrap();
             // In simulated time, which may be another run.
             assert_eq!((found.1, found.2), (10, false));
+            // Unless a node that both name started once.
+            let found = offset(&only(&one, true), &only(&later, true), true).unwrap();
+            assert!(found.2);
         }
     }
 }

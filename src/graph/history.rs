@@ -29,6 +29,7 @@ use crate::base::rhythm::{
 };
 use crate::base::time::{Span, Stamp};
 
+pub(crate) use recordings::parts;
 pub(crate) use records::{History, Record, made};
 pub(crate) use restarts::unread;
 pub(crate) use senders::traffic;

@@ -7,7 +7,7 @@ use crate::bag::straight::{self, ClockFall, Straightened, Watched};
 use crate::bag::{self, Input, OpenOptions, Report, known_span};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::time::Span;
+use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::clock;
 use crate::evidence::collector::{Collector, Recorded};
@@ -23,19 +23,23 @@ pub(super) struct Collected {
     pub(super) range: Span,
 }
 
-/// Reads every bag once, and again if several recorded one robot; with `verify` by the second, independent reader. Adds the offsets
+/// Reads every bag once, and again if several recorded one robot or two recordings of it were merged; with `verify` by the second, independent reader. Adds the offsets
 /// of clocks that it finds to the reading.
 pub(super) fn collect(
     reading: &mut Reading,
     verify: bool,
     watch: &mut dyn Watch,
 ) -> Result<Collected> {
-    let mut all = once(reading, &Copies::default(), verify, watch)?;
+    let mut merged = None;
+    let mut all = once(reading, &Copies::default(), &mut merged, verify, watch)?;
     let pairs = copies::pairs(reading, &all.inputs, &all.recorded)?;
     let (shifts, mut notices) = copies::correct(reading, &pairs, &all.inputs);
     let left_out = copies::copies(&all.recorded, &pairs, &shifts);
     if !notices.is_empty() || !left_out.is_empty() {
-        all = once(reading, &left_out, verify, watch)?;
+        if let Some(merged) = &mut merged {
+            copies::moved(merged, &shifts);
+        }
+        all = once(reading, &left_out, &mut merged, verify, watch)?;
     }
     let offsets = &all.recorded.offsets;
     for of_bag in offsets.chunk_by(|a, b| a.bag == b.bag) {
@@ -46,10 +50,12 @@ pub(super) fn collect(
     Ok(all)
 }
 
-/// Reads every bag once, without messages that another one contains.
+/// Reads every bag once, without messages that another one contains, or that it contains twice (`merged`), which it finds if that is not
+/// known yet.
 fn once(
     reading: &Reading,
     copies: &Copies,
+    merged: &mut Option<Copies>,
     verify: bool,
     watch: &mut dyn Watch,
 ) -> Result<Collected> {
@@ -77,7 +83,8 @@ fn once(
     let mut reports = Vec::new();
     let mut seams = Vec::new();
     let (mut before, mut size) = (0, 0);
-    let mut left_out = Vec::new();
+    let none = Copies::default();
+    let (mut left_out, mut covered) = (Vec::new(), Vec::new());
     for (bag, (reader, space)) in readers.iter_mut().zip(&spaces).enumerate() {
         let mut progress = |done, total: u64| {
             size = total;
@@ -86,32 +93,42 @@ fn once(
         let mut sink = collector.bag_in(space, &mut progress);
         let mut rest = Rest::new(&mut sink, copies, bag);
         let mut watched = Watched::new(&mut rest);
-        reports.push(reader.read(range, &mut watched)?);
+        let mut once = Rest::new(&mut watched, merged.as_ref().unwrap_or(&none), bag);
+        reports.push(reader.read(range, &mut once)?);
+        let again = once.left_out;
         seams.push(watched.seams());
-        left_out.push(rest.left_out);
+        left_out.push(rest.left_out + again);
+        covered.push(rest.covered);
         before += std::mem::take(&mut size);
     }
-    let is_straight = seams.iter().all(Vec::is_empty);
     let is_pipe = inputs.iter().any(Input::is_pipe);
-    if !is_straight && !is_pipe {
-        let first = collector.finish()?;
-        for (bag, seams) in seams.iter_mut().enumerate() {
-            for seam in seams {
-                copies::examine(reading, &inputs[bag], (&first, bag), seam)?;
-            }
-        }
-        collector = Collector::new(affordable(reading));
+    let mut recorded = collector.finish()?;
+    let is_known = merged.is_some();
+    let many: Vec<usize> = seams.iter().map(Vec::len).collect();
+    let found = match merged.take() {
+        Some(known) => known,
+        None => copies::merged(reading, &inputs, &recorded, &many)?,
+    };
+    let merged = merged.insert(found);
+    // What is only in the recording that was appended to another begins no run.
+    for (bag, _) in merged.with_ids().filter(|(_, own)| !own.is_empty()) {
+        seams[bag].clear();
+    }
+    let is_straight = seams.iter().all(Vec::is_empty);
+    if !is_pipe && (!is_straight || !is_known && !merged.is_empty()) {
+        let mut collector = Collector::new(affordable(reading));
         let all = readers.iter_mut().zip(&spaces).zip(&seams);
         for (bag, ((reader, space), seams)) in all.enumerate() {
             let mut progress = |done, total| watch.progress(done, total);
             let mut sink = collector.bag_in(space, &mut progress);
             let mut rest = Rest::new(&mut sink, copies, bag);
             let mut straight = Straightened::new(seams, &mut rest);
-            reader.read(range, &mut straight)?;
-            left_out[bag] = straight.left_out + rest.left_out;
+            let mut once = Rest::new(&mut straight, merged, bag);
+            reader.read(range, &mut once)?;
+            left_out[bag] = once.left_out + rest.left_out;
         }
+        recorded = collector.finish()?;
     }
-    let mut recorded = collector.finish()?;
     let Some(whole) = known.or(recorded.span) else {
         return Err(no_messages(&reading.inputs, &recorded.notices));
     };
@@ -122,6 +139,11 @@ fn once(
     if cut {
         recorded.cut(range, range.start <= whole.start)?;
     }
+    let inside = |((from, to), all): ((Stamp, Stamp), Span)| (from.max(all.start), to.min(all.end));
+    let covered = covered
+        .into_iter()
+        .map(|own| own.zip(recorded.span).map(inside));
+    recorded.covered = covered.collect();
     recorded.notices.extend(twice);
     recorded.notices.extend(gap(&recorded, &inputs));
     let left_out = left_out.iter().zip(&inputs).filter(|(many, _)| **many > 0);

@@ -5,7 +5,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::Reading;
 use super::inputs::{affordable, given_offset, in_time, space_of};
-use crate::bag::straight::{Seam, pass};
 use crate::bag::{self, ConnectionId, Input, Message, OpenOptions, Sink};
 use crate::base::error::Result;
 use crate::base::ids::ById;
@@ -16,11 +15,13 @@ use crate::evidence::clock::{self, ClockOffset, NEAR_NS};
 use crate::evidence::collector::{CollectOptions, Collector, Recorded, spool_error};
 use crate::evidence::inference::Stream;
 use crate::evidence::observation::Name;
+use crate::graph::parts;
 
 /// The time that is compared in large bags, whose payloads are not read, in nanoseconds: messages of slow topics are in it, too.
 const SAMPLE_NS: i64 = 10_000_000_000;
 
-/// The messages that are left out since another bag contains them: by bag and connection, the times that the other covers.
+/// The messages that are left out since another bag, or the same, contains them: by bag and connection, their times, sorted; an interval
+/// without length is the second message at its time.
 pub(super) type Copies = ById<usize, BTreeMap<ConnectionId, Vec<Span>>>;
 
 /// What a topic's messages in two bags have in common: its name, its publisher and its type.
@@ -89,8 +90,72 @@ pub(super) fn pairs(
             ..*pair
         }));
     }
-    pairs.sort_unstable_by_key(|pair| (pair.bag, pair.other));
-    Ok(pairs)
+    Ok(of_recordings(&pairs, recorded))
+}
+
+/// The pairs of all bags of recordings of which some are pairs, by those with most messages: the clock of a recorder is that of all parts
+/// into which it splits its recording, and parts that have little in common may agree by chance.
+fn of_recordings(pairs: &[ClockOffset], recorded: &Recorded) -> Vec<ClockOffset> {
+    let mut of: ById<usize, (usize, usize)> = spans(recorded).ids().map(|bag| (0, bag)).collect();
+    for (at, one) in (1..).zip(parts(recorded, &recorded.streams)) {
+        let is_inside =
+            |pair: &ClockOffset| one.bags.contains(&pair.bag) && one.bags.contains(&pair.other);
+        // Two recorders, of which the clock of one is so far ahead that its recording seems to be the next part.
+        if !pairs.iter().any(is_inside) {
+            one.bags.iter().for_each(|bag| of[*bag] = (at, 0));
+        }
+    }
+    let mut best: BTreeMap<_, (usize, i64)> = BTreeMap::new();
+    for pair in pairs {
+        let (one, other) = (of[pair.bag], of[pair.other]);
+        for (key, ahead) in [((one, other), pair.ahead), ((other, one), -pair.ahead)] {
+            let known = best.entry(key).or_default();
+            *known = (*known).max((pair.messages, ahead));
+        }
+    }
+    let all = of
+        .ids()
+        .flat_map(|bag| (0..bag).map(move |other| (bag, other)));
+    let pair = |(bag, other): (usize, usize)| {
+        let (messages, ahead) = *best.get(&(of[bag], of[other]))?;
+        let is_one_robot = true;
+        Some(ClockOffset {
+            bag,
+            other,
+            ahead,
+            messages,
+            is_one_robot,
+        })
+    };
+    all.filter_map(pair).collect()
+}
+
+/// The messages that bags themselves contain twice, since recordings were merged; `seams`: how often time goes back in each bag.
+pub(super) fn merged(
+    reading: &Reading,
+    inputs: &[Input],
+    recorded: &Recorded,
+    seams: &[usize],
+) -> Result<Copies> {
+    let mut copies = Copies::default();
+    let read = recorded.facts.payloads.somes();
+    let read: BTreeSet<usize> = read.map(|(at, _)| recorded.streams[at].bag).collect();
+    let all = inputs.iter().zip(seams).enumerate();
+    for (bag, (input, seams)) in all.filter(|(_, (input, _))| !input.is_pipe()) {
+        let sampled;
+        let (all, of) = if read.contains(&bag) || *seams == 0 {
+            (recorded, bag)
+        } else {
+            sampled = sample(reading, &[input], None)?;
+            (&sampled, 0)
+        };
+        let again = clock::merged((&all.streams, &all.facts), of, *seams);
+        for (at, span) in again.map_err(spool_error)? {
+            let of_bag = copies.grown(bag).entry(all.streams[at].connection.id);
+            of_bag.or_default().push(span);
+        }
+    }
+    Ok(copies)
 }
 
 /// The times that each bag covers.
@@ -147,6 +212,14 @@ pub(super) fn correct(
     (shifts, notices)
 }
 
+/// Moves the times of copies with the clocks of their bags.
+pub(super) fn moved(copies: &mut Copies, shifts: &ById<usize, i64>) {
+    for (bag, by) in shifts.with_ids() {
+        let spans = copies.grown(bag).values_mut().flatten();
+        spans.for_each(|span| *span = Span::new(span.start.plus(*by), span.end.plus(*by)));
+    }
+}
+
 /// The messages that are left out: of each topic those from the time of a bag that has more of them. What one recorder missed is
 /// not taken from another.
 pub(super) fn copies(
@@ -184,39 +257,22 @@ pub(super) fn copies(
             }
         }
     }
+    for spans in copies.iter_mut().flat_map(BTreeMap::values_mut) {
+        *spans = Span::joined(std::mem::take(spans), 0);
+    }
     copies
 }
 
-/// Finds out whether the run after a seam repeats the messages before it.
-pub(super) fn examine(
-    reading: &Reading,
-    input: &Input,
-    (recorded, bag): (&Recorded, usize),
-    seam: &mut Seam,
-) -> Result<()> {
-    let is_both = |s: &&Stream| {
-        let before = seam.count_before(s.connection.id);
-        s.bag == bag && before > 0 && recorded.messages.count(s.times) > before
-    };
-    let both = recorded.streams.iter().filter(is_both);
-    let both: BTreeSet<ConnectionId> = both.map(|s| s.connection.id).collect();
-    let span = Span::new(seam.after, seam.before.plus(1));
-    let repeats = |all: &Recorded, bag: usize| {
-        let is_both = |s: &Stream| s.bag == bag && both.contains(&s.connection.id);
-        clock::repeats((&all.streams, &all.facts), span, is_both).map_err(spool_error)
-    };
-    if repeats(recorded, bag)? || repeats(&sample(reading, &[input], Some(span))?, 0)? {
-        seam.repeated = both;
-    }
-    Ok(())
-}
-
-/// A sink that passes everything on but what another bag contains.
+/// A sink that passes everything on but what another bag, or the same, contains.
 pub(super) struct Rest<'a> {
     sink: &'a mut dyn Sink,
     copies: Option<&'a BTreeMap<ConnectionId, Vec<Span>>>,
     /// The number of messages that were left out.
     pub(super) left_out: u64,
+    /// The first and the last moment of all messages, if some may be left out.
+    pub(super) covered: Option<(Stamp, Stamp)>,
+    /// The stamps and the messages that were passed on although the same connection has another one at their time, which is not.
+    passed: BTreeSet<(bool, ConnectionId, Stamp)>,
 }
 
 impl<'a> Rest<'a> {
@@ -225,13 +281,25 @@ impl<'a> Rest<'a> {
             sink,
             copies: copies.get(bag).filter(|own| !own.is_empty()),
             left_out: 0,
+            covered: None,
+            passed: BTreeSet::new(),
         }
     }
 
-    fn kept(&self, connection: ConnectionId, time: Stamp) -> Option<Stamp> {
-        let spans = self.copies.and_then(|all| all.get(&connection));
-        let is_copy = spans.is_some_and(|spans| spans.iter().any(|span| span.contains(time)));
-        (!is_copy).then_some(time)
+    fn keeps(&mut self, is_stamp: bool, connection: ConnectionId, time: Stamp) -> bool {
+        let Some(copies) = self.copies else {
+            return true;
+        };
+        let (from, to) = self.covered.unwrap_or((time, time));
+        self.covered = Some((from.min(time), to.max(time)));
+        let spans = copies.get(&connection).map_or(&[][..], Vec::as_slice);
+        let next = spans.partition_point(|span| span.start <= time);
+        match next.checked_sub(1).map(|at| spans[at]) {
+            Some(span) if span.nanos() == 0 && span.start == time => {
+                self.passed.insert((is_stamp, connection, time))
+            }
+            span => !span.is_some_and(|span| span.contains(time)),
+        }
     }
 }
 
@@ -242,16 +310,22 @@ impl Sink for Rest<'_> {
 
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
         if self.copies.is_none() {
-            self.sink.stamps(connection, stamps, sizes);
-            return;
+            return self.sink.stamps(connection, stamps, sizes);
         }
-        let kept = stamps.iter().map(|time| self.kept(connection, *time));
-        let kept: Vec<Option<Stamp>> = kept.collect();
-        self.left_out += pass(&mut *self.sink, connection, &kept, sizes);
+        let (mut times, mut kept) = (Vec::new(), Vec::new());
+        for (at, time) in stamps.iter().enumerate() {
+            if self.keeps(true, connection, *time) {
+                times.push(*time);
+                kept.extend(sizes.and_then(|sizes| sizes.get(at)));
+            }
+        }
+        self.left_out += (stamps.len() - times.len()) as u64;
+        let sizes = sizes.map(|_| &kept[..]);
+        self.sink.stamps(connection, &times, sizes);
     }
 
     fn message(&mut self, message: Message<'_>) {
-        if self.kept(message.connection, message.time).is_some() {
+        if self.keeps(false, message.connection, message.time) {
             self.sink.message(message);
         }
     }

@@ -12,46 +12,65 @@ use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::observation::Name;
 use crate::graph::ById;
 
-/// The first and the last moment of the recording that each bag is a part of, by bag; `None` without messages. A bag is a part of
-/// another's recording if it precedes or follows it and has most topics in common with it.
-pub(crate) fn recordings(recorded: &Recorded, streams: &[Stream]) -> Vec<Option<(Stamp, Stamp)>> {
-    let mut spans: ById<usize, Option<(Stamp, Stamp)>> = ById::default();
-    let mut of_bags: ById<usize, BTreeSet<Name>> = ById::default();
+/// A recording: of one file, or split into several.
+pub(crate) struct Recording {
+    /// The first and the last moment.
+    span: (Stamp, Stamp),
+    /// The bags of it.
+    pub(crate) bags: Vec<usize>,
+    topics: BTreeSet<Name>,
+}
+
+/// The bags of each recording, in order: a bag continues the recording that ended just before it, if it has most topics in common with it.
+/// Of two recorders that split their recordings, each continues its own.
+pub(crate) fn parts(recorded: &Recorded, streams: &[Stream]) -> Vec<Recording> {
+    let mut bags: ById<usize, Option<Recording>> = ById::default();
     for stream in streams {
-        let span = spans.grown(stream.bag);
-        if let Some((first, last)) = recorded.messages.bounds(stream.times) {
-            let all = span.get_or_insert((first, last));
-            *all = (all.0.min(first), all.1.max(last));
-            of_bags.grown(stream.bag).insert(stream.topic);
+        let own = recorded.messages.bounds(stream.times).into_iter();
+        for (from, to) in own.chain(recorded.covered.get(stream.bag).copied().flatten()) {
+            let own = bags.grown(stream.bag).get_or_insert_with(|| Recording {
+                span: (from, to),
+                bags: vec![stream.bag],
+                topics: BTreeSet::new(),
+            });
+            own.span = (own.span.0.min(from), own.span.1.max(to));
+            own.topics.insert(stream.topic);
         }
     }
-    let is_part = |a: usize, b: usize| {
-        let (Some(one), Some(other)) = (spans[a], spans[b]) else {
-            return false;
+    let mut bags: Vec<Recording> = bags.into_iter().flatten().collect();
+    bags.sort_by_key(|one| one.span);
+    let mut all: Vec<Recording> = Vec::new();
+    for part in bags {
+        let goes_on = |one: &&mut Recording| {
+            let common = one.topics.intersection(&part.topics).count();
+            one.span.1.since(part.span.0) <= OUT_OF_ORDER_NS
+                && common * 2 > one.topics.len().min(part.topics.len())
         };
-        let (topics, others) = (&of_bags[a], &of_bags[b]);
-        let shared = one.1.min(other.1).since(one.0.max(other.0));
-        let common = topics.intersection(others).count();
-        shared <= OUT_OF_ORDER_NS && common * 2 > topics.len().min(others.len())
-    };
-    let mut of: Vec<usize> = (0..spans.len()).collect();
-    for a in 0..spans.len() {
-        for b in 0..a {
-            if of[a] != of[b] && is_part(a, b) {
-                let (old, new) = (of[a], of[b]);
-                let own = of.iter_mut().filter(|one| **one == old);
-                own.for_each(|one| *one = new);
+        let gap = |one: &&mut Recording| part.span.0.since(one.span.1).abs();
+        match all.iter_mut().filter(goes_on).min_by_key(gap) {
+            Some(one) => {
+                one.span.1 = one.span.1.max(part.span.1);
+                one.bags.extend(part.bags);
+                one.topics.extend(part.topics);
             }
+            None => all.push(part),
         }
     }
-    let mut whole: ById<usize, Option<(Stamp, Stamp)>> = ById::default();
-    for (span, one) in spans.iter().zip(&of) {
-        if let Some((from, to)) = *span {
-            let all = whole.grown(*one).get_or_insert((from, to));
-            *all = (all.0.min(from), all.1.max(to));
+    all
+}
+
+/// The first and the last moment of the recording that each bag is a part of, by bag; `None` without messages.
+pub(crate) fn recordings(
+    recorded: &Recorded,
+    streams: &[Stream],
+) -> ById<usize, Option<(Stamp, Stamp)>> {
+    let mut spans = ById::default();
+    for one in parts(recorded, streams) {
+        for bag in one.bags {
+            *spans.grown(bag) = Some(one.span);
         }
     }
-    of.iter().map(|one| whole.some(*one).copied()).collect()
+    spans
 }
 
 /// The nodes that several recordings contain at the same time as publishers of one topic: of several robots,

@@ -95,7 +95,7 @@ pub(crate) fn traffic(recorded: &Recorded, findings: &Findings) -> Result<Traffi
 fn senders(
     recorded: &Recorded,
     findings: &Findings,
-    recordings: &[Option<(Stamp, Stamp)>],
+    recordings: &ById<usize, Option<(Stamp, Stamp)>>,
     streams: Vec<usize>,
 ) -> io::Result<Senders> {
     let of_topic: Vec<&Stream> = streams.iter().map(|at| &findings.streams[*at]).collect();
@@ -180,7 +180,7 @@ impl SenderTimes {
 /// The index of each stream's sender, and the senders without times yet.
 fn places(
     streams: &[&Stream],
-    recordings: &[Option<(Stamp, Stamp)>],
+    recordings: &ById<usize, Option<(Stamp, Stamp)>>,
 ) -> (Vec<usize>, Vec<SenderTimes>) {
     let mut nodes: Vec<Option<Name>> = streams.iter().map(|stream| sender(stream)).collect();
     nodes.sort_unstable();
@@ -188,7 +188,7 @@ fn places(
     let place = |stream: &&Stream| nodes.binary_search(&sender(stream)).unwrap_or(0);
     let received = nodes.iter().map(|node| {
         let own = || streams.iter().filter(|stream| sender(stream) == *node);
-        let reached = own().filter_map(|stream| recordings[stream.bag]);
+        let reached = own().filter_map(|stream| recordings.some(stream.bag).copied());
         let reached = reached.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         SenderTimes {
             node: *node,
