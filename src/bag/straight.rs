@@ -255,6 +255,9 @@ impl Sink for Straightened<'_> {
     }
 
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
+        if self.seams.is_empty() {
+            return self.sink.stamps(connection, stamps, sizes);
+        }
         let moved = stamps.iter().map(|time| self.moved(connection, 0, *time));
         let moved: Vec<Stamp> = moved.collect();
         self.sink.stamps(connection, &moved, sizes);

@@ -45,6 +45,16 @@ pub struct Bound {
     pub latest: Stamp,
 }
 
+impl Bound {
+    pub(crate) fn new(time: Stamp, earliest: Stamp, latest: Stamp) -> Self {
+        Self {
+            time,
+            earliest,
+            latest,
+        }
+    }
+}
+
 /// One lifetime of an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Life {

@@ -3,15 +3,15 @@
 use super::copies::{self, Copies, Rest};
 use super::inputs::{affordable, check_named, each_once, in_time, space_of};
 use super::{Reading, Watch};
-use crate::bag::straight::{self, ClockFall, Straightened, Watched};
+use crate::bag::straight::{self, ClockFall, Seam, Straightened, Watched};
 use crate::bag::{self, Input, OpenOptions, Report, known_span};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::time::{Span, Stamp};
+use crate::base::time::Span;
 use crate::base::words;
 use crate::evidence::clock;
 use crate::evidence::collector::{Collector, Recorded};
-use crate::graph::window;
+use crate::graph::{self, window};
 
 /// The bags of a mission, read.
 pub(super) struct Collected {
@@ -32,7 +32,8 @@ pub(super) fn collect(
 ) -> Result<Collected> {
     let mut merged = None;
     let mut all = once(reading, &Copies::default(), &mut merged, verify, watch)?;
-    let pairs = copies::pairs(reading, &all.inputs, &all.recorded)?;
+    let parts = graph::parts(&all.recorded);
+    let pairs = copies::pairs(reading, &all.inputs, &all.recorded, &parts)?;
     let (shifts, mut notices) = copies::correct(reading, &pairs, &all.inputs);
     let left_out = copies::copies(&all.recorded, &pairs, &shifts);
     if !notices.is_empty() || !left_out.is_empty() {
@@ -40,6 +41,7 @@ pub(super) fn collect(
             copies::moved(merged, &shifts);
         }
         all = once(reading, &left_out, &mut merged, verify, watch)?;
+        all.recorded.parts = parts;
     }
     let offsets = &all.recorded.offsets;
     for of_bag in offsets.chunk_by(|a, b| a.bag == b.bag) {
@@ -79,35 +81,33 @@ fn once(
         .map(|span| window::range(&reading.division, span))
         .transpose()?;
     let spaces: Vec<String> = inputs.iter().map(|i| space_of(reading, i)).collect();
-    let mut collector = Collector::new(affordable(reading));
-    let mut reports = Vec::new();
-    let mut seams = Vec::new();
-    let (mut before, mut size) = (0, 0);
-    let none = Copies::default();
-    let (mut left_out, mut covered) = (Vec::new(), Vec::new());
-    for (bag, (reader, space)) in readers.iter_mut().zip(&spaces).enumerate() {
-        let mut progress = |done, total: u64| {
-            size = total;
-            watch.progress(before + done, whole.max(before + total));
-        };
-        let mut sink = collector.bag_in(space, &mut progress);
-        let mut rest = Rest::new(&mut sink, copies, bag);
-        let mut watched = Watched::new(&mut rest);
-        let mut once = Rest::new(&mut watched, merged.as_ref().unwrap_or(&none), bag);
-        reports.push(reader.read(range, &mut once)?);
-        let again = once.left_out;
-        seams.push(watched.seams());
-        left_out.push(rest.left_out + again);
-        covered.push(rest.covered);
-        before += std::mem::take(&mut size);
-    }
+    let mut pass = |seams: &[Vec<Seam>], merged: &Copies| {
+        let mut collector = Collector::new(affordable(reading));
+        let (mut before, mut size, mut all) = (0, 0, Vec::new());
+        for (bag, (reader, space)) in readers.iter_mut().zip(&spaces).enumerate() {
+            let mut progress = |done, total: u64| {
+                size = total;
+                watch.progress(before + done, whole.max(before + total));
+            };
+            let mut sink = collector.bag_in(space, &mut progress);
+            let mut rest = Rest::new(&mut sink, copies, bag);
+            let seams = seams.get(bag).map_or(&[][..], Vec::as_slice);
+            let mut straight = Straightened::new(seams, &mut rest);
+            let mut watched = Watched::new(&mut straight);
+            let mut once = Rest::new(&mut watched, merged, bag);
+            let report = reader.read(range, &mut once)?;
+            let again = once.left_out;
+            all.push((report, watched.seams(), again + rest.left_out));
+            before += std::mem::take(&mut size);
+        }
+        Ok::<_, Error>((collector.finish()?, all))
+    };
+    let (mut recorded, mut all) = pass(&[], merged.as_ref().unwrap_or(&Copies::default()))?;
+    let mut seams: Vec<Vec<Seam>> = all.iter().map(|of| of.1.clone()).collect();
     let is_pipe = inputs.iter().any(Input::is_pipe);
-    let mut recorded = collector.finish()?;
-    let is_known = merged.is_some();
-    let many: Vec<usize> = seams.iter().map(Vec::len).collect();
-    let found = match merged.take() {
-        Some(known) => known,
-        None => copies::merged(reading, &inputs, &recorded, &many)?,
+    let (is_known, found) = match merged.take() {
+        Some(known) => (true, known),
+        None => (false, copies::merged(reading, &inputs, &recorded, &seams)?),
     };
     let merged = merged.insert(found);
     // What is only in the recording that was appended to another begins no run.
@@ -116,18 +116,7 @@ fn once(
     }
     let is_straight = seams.iter().all(Vec::is_empty);
     if !is_pipe && (!is_straight || !is_known && !merged.is_empty()) {
-        let mut collector = Collector::new(affordable(reading));
-        let all = readers.iter_mut().zip(&spaces).zip(&seams);
-        for (bag, ((reader, space), seams)) in all.enumerate() {
-            let mut progress = |done, total| watch.progress(done, total);
-            let mut sink = collector.bag_in(space, &mut progress);
-            let mut rest = Rest::new(&mut sink, copies, bag);
-            let mut straight = Straightened::new(seams, &mut rest);
-            let mut once = Rest::new(&mut straight, merged, bag);
-            reader.read(range, &mut once)?;
-            left_out[bag] = once.left_out + rest.left_out;
-        }
-        recorded = collector.finish()?;
+        (recorded, all) = pass(&seams, merged)?;
     }
     let Some(whole) = known.or(recorded.span) else {
         return Err(no_messages(&reading.inputs, &recorded.notices));
@@ -139,14 +128,10 @@ fn once(
     if cut {
         recorded.cut(range, range.start <= whole.start)?;
     }
-    let inside = |((from, to), all): ((Stamp, Stamp), Span)| (from.max(all.start), to.min(all.end));
-    let covered = covered
-        .into_iter()
-        .map(|own| own.zip(recorded.span).map(inside));
-    recorded.covered = covered.collect();
     recorded.notices.extend(twice);
     recorded.notices.extend(gap(&recorded, &inputs));
-    let left_out = left_out.iter().zip(&inputs).filter(|(many, _)| **many > 0);
+    let left_out = all.iter().map(|of| &of.2).zip(&inputs);
+    let left_out = left_out.filter(|(many, _)| **many > 0);
     recorded.notices.extend(left_out.map(twice_recorded));
     let falls = seams
         .iter()
@@ -170,7 +155,7 @@ fn once(
     }
     Ok(Collected {
         inputs,
-        reports,
+        reports: all.into_iter().map(|of| of.0).collect(),
         recorded,
         range,
     })

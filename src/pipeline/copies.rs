@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::Reading;
 use super::inputs::{affordable, given_offset, in_time, space_of};
+use crate::bag::straight::Seam;
 use crate::bag::{self, ConnectionId, Input, Message, OpenOptions, Sink};
 use crate::base::error::Result;
 use crate::base::ids::ById;
@@ -15,7 +16,6 @@ use crate::evidence::clock::{self, ClockOffset, NEAR_NS};
 use crate::evidence::collector::{CollectOptions, Collector, Recorded, spool_error};
 use crate::evidence::inference::Stream;
 use crate::evidence::observation::Name;
-use crate::graph::parts;
 
 /// The time that is compared in large bags, whose payloads are not read, in nanoseconds: messages of slow topics are in it, too.
 const SAMPLE_NS: i64 = 10_000_000_000;
@@ -47,6 +47,7 @@ pub(super) fn pairs(
     reading: &Reading,
     inputs: &[Input],
     recorded: &Recorded,
+    parts: &[Vec<usize>],
 ) -> Result<Vec<ClockOffset>> {
     let space = |bag: usize| space_of(reading, &inputs[bag]);
     let is_one = |pair: &&ClockOffset| pair.is_one_robot && space(pair.bag) == space(pair.other);
@@ -54,13 +55,10 @@ pub(super) fn pairs(
     let is_unread =
         |at: &usize| !recorded.streams[*at].latched && recorded.facts.payloads.some(*at).is_none();
     let mut common: BTreeSet<[usize; 2]> = BTreeSet::new();
-    let mut unread: BTreeSet<usize> = BTreeSet::new();
-    for bags in by_key(recorded).values().filter(|bags| bags.len() > 1) {
-        let own = bags.iter().filter(|(_, own)| own.iter().any(is_unread));
-        for (bag, _) in own {
+    for bags in by_key(recorded).values() {
+        for (bag, _) in bags.iter().filter(|(_, own)| own.iter().any(is_unread)) {
             let others = bags.keys().filter(|other| *other != bag);
             common.extend(others.map(|other| [*bag.min(other), *bag.max(other)]));
-            unread.insert(*bag);
         }
     }
     let is_known = |bags: &[usize; 2]| {
@@ -68,19 +66,21 @@ pub(super) fn pairs(
         pairs.iter().any(of) || bags.iter().any(|bag| inputs[*bag].is_pipe())
     };
     common.retain(|bags| !is_known(bags));
-    // A bag beside one whose payloads have been read is read whole, of two others the time that they share.
-    let is_small = affordable(reading).payload_bytes > 0;
-    let is_beside = |bags: &[usize; 2]| is_small && !bags.iter().all(|bag| unread.contains(bag));
-    let (beside, apart): (Vec<_>, Vec<_>) = common.into_iter().partition(is_beside);
-    let beside: BTreeSet<usize> = beside.into_iter().flatten().collect();
-    let spans = spans(recorded);
-    let shared = apart.into_iter().filter_map(|[one, other]| {
-        let (first, second) = (spans.some(one)?, spans.some(other)?);
-        let part = Span::new(first.start.max(second.start), first.end.min(second.end));
-        (part.nanos() > NEAR_NS).then(|| (vec![one, other], Some(part)))
-    });
-    let whole = (!beside.is_empty()).then(|| (beside.into_iter().collect(), None));
-    for (bags, part) in whole.into_iter().chain(shared) {
+    // Small bags are read whole, of large ones the time that two of them share.
+    let samples = if affordable(reading).payload_bytes > 0 {
+        let bags: BTreeSet<usize> = common.into_iter().flatten().collect();
+        vec![(bags.into_iter().collect(), None)]
+    } else {
+        let spans = spans(recorded);
+        let shared = |bags: [usize; 2]| {
+            let [one, other] = bags.map(|bag| spans.some(bag));
+            let (one, other) = one.zip(other)?;
+            let part = Span::new(one.start.max(other.start), one.end.min(other.end));
+            (part.nanos() > NEAR_NS).then(|| (bags.to_vec(), Some(part)))
+        };
+        common.into_iter().filter_map(shared).collect::<Vec<_>>()
+    };
+    for (bags, part) in samples {
         let inputs: Vec<&Input> = bags.iter().map(|bag| &inputs[*bag]).collect();
         let sample = sample(reading, &inputs, part)?;
         let found = sample.offsets.iter().filter(|pair| pair.is_one_robot);
@@ -90,52 +90,46 @@ pub(super) fn pairs(
             ..*pair
         }));
     }
-    Ok(of_recordings(&pairs, recorded))
-}
-
-/// The pairs of all bags of recordings of which some are pairs, by those with most messages: the clock of a recorder is that of all parts
-/// into which it splits its recording, and parts that have little in common may agree by chance.
-fn of_recordings(pairs: &[ClockOffset], recorded: &Recorded) -> Vec<ClockOffset> {
-    let mut of: ById<usize, (usize, usize)> = spans(recorded).ids().map(|bag| (0, bag)).collect();
-    for (at, one) in (1..).zip(parts(recorded, &recorded.streams)) {
-        let is_inside =
-            |pair: &ClockOffset| one.bags.contains(&pair.bag) && one.bags.contains(&pair.other);
-        // Two recorders, of which the clock of one is so far ahead that its recording seems to be the next part.
-        if !pairs.iter().any(is_inside) {
-            one.bags.iter().for_each(|bag| of[*bag] = (at, 0));
+    // The clock of a recorder is that of all parts into which it splits its recording; parts that have little in common may agree by chance.
+    let mut best: BTreeMap<[usize; 2], (usize, i64)> = BTreeMap::new();
+    let of = |bag: usize| {
+        parts
+            .iter()
+            .position(|bags| bags.contains(&bag))
+            .unwrap_or(0)
+    };
+    for pair in &pairs {
+        let (one, other) = (of(pair.bag), of(pair.other));
+        // Or of two recorders the one whose clock is so far ahead that its recording seems to be the next part.
+        if one == other {
+            pairs.sort_unstable_by_key(|pair| (pair.bag, pair.other));
+            return Ok(pairs);
         }
-    }
-    let mut best: BTreeMap<_, (usize, i64)> = BTreeMap::new();
-    for pair in pairs {
-        let (one, other) = (of[pair.bag], of[pair.other]);
-        for (key, ahead) in [((one, other), pair.ahead), ((other, one), -pair.ahead)] {
+        for (key, ahead) in [([one, other], pair.ahead), ([other, one], -pair.ahead)] {
             let known = best.entry(key).or_default();
             *known = (*known).max((pair.messages, ahead));
         }
     }
-    let all = of
-        .ids()
-        .flat_map(|bag| (0..bag).map(move |other| (bag, other)));
-    let pair = |(bag, other): (usize, usize)| {
-        let (messages, ahead) = *best.get(&(of[bag], of[other]))?;
-        let is_one_robot = true;
+    let all = (0..inputs.len()).flat_map(|bag| (0..bag).map(move |other| [bag, other]));
+    let pair = |[bag, other]: [usize; 2]| {
+        let (messages, ahead) = *best.get(&[of(bag), of(other)])?;
         Some(ClockOffset {
             bag,
             other,
             ahead,
             messages,
-            is_one_robot,
+            is_one_robot: true,
         })
     };
-    all.filter_map(pair).collect()
+    Ok(all.filter_map(pair).collect())
 }
 
-/// The messages that bags themselves contain twice, since recordings were merged; `seams`: how often time goes back in each bag.
+/// The messages that bags themselves contain twice, since recordings were merged; `seams`: where time goes back in each bag.
 pub(super) fn merged(
     reading: &Reading,
     inputs: &[Input],
     recorded: &Recorded,
-    seams: &[usize],
+    seams: &[Vec<Seam>],
 ) -> Result<Copies> {
     let mut copies = Copies::default();
     let read = recorded.facts.payloads.somes();
@@ -143,13 +137,13 @@ pub(super) fn merged(
     let all = inputs.iter().zip(seams).enumerate();
     for (bag, (input, seams)) in all.filter(|(_, (input, _))| !input.is_pipe()) {
         let sampled;
-        let (all, of) = if read.contains(&bag) || *seams == 0 {
+        let (all, of) = if read.contains(&bag) || seams.is_empty() {
             (recorded, bag)
         } else {
             sampled = sample(reading, &[input], None)?;
             (&sampled, 0)
         };
-        let again = clock::merged((&all.streams, &all.facts), of, *seams);
+        let again = clock::merged((&all.streams, &all.facts), of, seams.len());
         for (at, span) in again.map_err(spool_error)? {
             let of_bag = copies.grown(bag).entry(all.streams[at].connection.id);
             of_bag.or_default().push(span);
@@ -269,8 +263,6 @@ pub(super) struct Rest<'a> {
     copies: Option<&'a BTreeMap<ConnectionId, Vec<Span>>>,
     /// The number of messages that were left out.
     pub(super) left_out: u64,
-    /// The first and the last moment of all messages, if some may be left out.
-    pub(super) covered: Option<(Stamp, Stamp)>,
     /// The stamps and the messages that were passed on although the same connection has another one at their time, which is not.
     passed: BTreeSet<(bool, ConnectionId, Stamp)>,
 }
@@ -281,7 +273,6 @@ impl<'a> Rest<'a> {
             sink,
             copies: copies.get(bag).filter(|own| !own.is_empty()),
             left_out: 0,
-            covered: None,
             passed: BTreeSet::new(),
         }
     }
@@ -290,8 +281,6 @@ impl<'a> Rest<'a> {
         let Some(copies) = self.copies else {
             return true;
         };
-        let (from, to) = self.covered.unwrap_or((time, time));
-        self.covered = Some((from.min(time), to.max(time)));
         let spans = copies.get(&connection).map_or(&[][..], Vec::as_slice);
         let next = spans.partition_point(|span| span.start <= time);
         match next.checked_sub(1).map(|at| spans[at]) {

@@ -12,63 +12,57 @@ use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::observation::Name;
 use crate::graph::ById;
 
-/// A recording: of one file, or split into several.
-pub(crate) struct Recording {
-    /// The first and the last moment.
-    span: (Stamp, Stamp),
-    /// The bags of it.
-    pub(crate) bags: Vec<usize>,
-    topics: BTreeSet<Name>,
-}
-
 /// The bags of each recording, in order: a bag continues the recording that ended just before it, if it has most topics in common with it.
 /// Of two recorders that split their recordings, each continues its own.
-pub(crate) fn parts(recorded: &Recorded, streams: &[Stream]) -> Vec<Recording> {
-    let mut bags: ById<usize, Option<Recording>> = ById::default();
-    for stream in streams {
-        let own = recorded.messages.bounds(stream.times).into_iter();
-        for (from, to) in own.chain(recorded.covered.get(stream.bag).copied().flatten()) {
-            let own = bags.grown(stream.bag).get_or_insert_with(|| Recording {
-                span: (from, to),
-                bags: vec![stream.bag],
-                topics: BTreeSet::new(),
-            });
-            own.span = (own.span.0.min(from), own.span.1.max(to));
-            own.topics.insert(stream.topic);
+pub(crate) fn parts(recorded: &Recorded) -> Vec<Vec<usize>> {
+    let mut bags: ById<usize, Option<((Stamp, Stamp), BTreeSet<Name>)>> = ById::default();
+    for stream in &recorded.streams {
+        if let Some((from, to)) = recorded.messages.bounds(stream.times) {
+            let (span, topics) = bags
+                .grown(stream.bag)
+                .get_or_insert(((from, to), BTreeSet::new()));
+            *span = (span.0.min(from), span.1.max(to));
+            topics.insert(stream.topic);
         }
     }
-    let mut bags: Vec<Recording> = bags.into_iter().flatten().collect();
-    bags.sort_by_key(|one| one.span);
-    let mut all: Vec<Recording> = Vec::new();
-    for part in bags {
-        let goes_on = |one: &&mut Recording| {
-            let common = one.topics.intersection(&part.topics).count();
-            one.span.1.since(part.span.0) <= OUT_OF_ORDER_NS
-                && common * 2 > one.topics.len().min(part.topics.len())
+    let mut bags: Vec<_> = bags.somes().collect();
+    bags.sort_by_key(|(_, (span, _))| *span);
+    let mut all: Vec<(Stamp, BTreeSet<Name>, Vec<usize>)> = Vec::new();
+    for (bag, ((from, to), topics)) in bags {
+        let goes_on = |(end, others, _): &&mut (Stamp, BTreeSet<Name>, Vec<usize>)| {
+            let common = others.intersection(topics).count();
+            end.since(*from) <= OUT_OF_ORDER_NS && common * 2 > others.len().min(topics.len())
         };
-        let gap = |one: &&mut Recording| part.span.0.since(one.span.1).abs();
-        match all.iter_mut().filter(goes_on).min_by_key(gap) {
-            Some(one) => {
-                one.span.1 = one.span.1.max(part.span.1);
-                one.bags.extend(part.bags);
-                one.topics.extend(part.topics);
+        let before = all.iter_mut().filter(goes_on);
+        match before.min_by_key(|(end, ..)| from.since(*end).abs()) {
+            Some((end, others, bags)) => {
+                *end = *to.max(end);
+                others.extend(topics);
+                bags.push(bag);
             }
-            None => all.push(part),
+            None => all.push((*to, topics.clone(), vec![bag])),
         }
     }
-    all
+    all.into_iter().map(|(.., bags)| bags).collect()
 }
 
 /// The first and the last moment of the recording that each bag is a part of, by bag; `None` without messages.
-pub(crate) fn recordings(
-    recorded: &Recorded,
-    streams: &[Stream],
-) -> ById<usize, Option<(Stamp, Stamp)>> {
-    let mut spans = ById::default();
-    for one in parts(recorded, streams) {
-        for bag in one.bags {
-            *spans.grown(bag) = Some(one.span);
-        }
+pub(crate) fn recordings(recorded: &Recorded) -> ById<usize, Option<(Stamp, Stamp)>> {
+    let mut spans: ById<usize, Option<(Stamp, Stamp)>> = ById::default();
+    let found = parts(recorded);
+    let parts = if recorded.parts.is_empty() {
+        &found
+    } else {
+        &recorded.parts
+    };
+    for bags in parts {
+        let own = recorded
+            .streams
+            .iter()
+            .filter(|stream| bags.contains(&stream.bag));
+        let bounds = own.filter_map(|stream| recorded.messages.bounds(stream.times));
+        let span = bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        bags.iter().for_each(|bag| *spans.grown(*bag) = span);
     }
     spans
 }

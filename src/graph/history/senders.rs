@@ -77,7 +77,7 @@ pub(crate) fn sender(stream: &Stream) -> Option<Name> {
 
 /// Reads the times of every topic once.
 pub(crate) fn traffic(recorded: &Recorded, findings: &Findings) -> Result<Traffic> {
-    let recordings = recordings(recorded, &findings.streams);
+    let recordings = recordings(recorded);
     let mut streams: ById<Name, Vec<usize>> = ById::default();
     for (at, stream) in findings.streams.iter().enumerate() {
         streams.grown(stream.topic).push(at);

@@ -86,11 +86,7 @@ fn event(
     let stretches = senders.iter().flat_map(|v| &v.stretches);
     let last = stretches.filter(|s| s.last == from);
     let period = last.map(|s| s.period).max().unwrap_or(0);
-    let at = Bound {
-        time: from,
-        earliest: from,
-        latest: from.plus(period),
-    };
+    let at = Bound::new(from, from, from.plus(period));
     super::Event {
         until: to,
         ..context.event(Kind::Silent, what, at)
