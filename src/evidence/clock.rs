@@ -548,7 +548,7 @@ mod tests {
             // In simulated time, which may be another run, unless a node in both started once.
             let both = [false, true].map(|is_one_run| found(only(true), is_one_run).unwrap());
             assert_eq!(
-                found.map(|found| (found.1, found.2)),
+                both.map(|found| (found.1, found.2)),
                 [(10, false), (10, true)]
             );
         }

@@ -173,7 +173,9 @@ pub(crate) fn private_name(source: SourceId, known: &mut Conclusions<'_>) {
         let name = known.text(topic);
         let last = name.rsplit('/').next().unwrap_or_default();
         let is_taken = TAKEN.iter().any(|taken| last.starts_with(taken));
-        let is_other = is_taken || is_hidden(&name) || is_log(&name);
+        // As those of actions and of service introspection are.
+        let is_hidden = name.split('/').any(|part| part.starts_with('_'));
+        let is_other = is_taken || is_hidden || is_log(&name);
         if known.publishers(topic).next().is_some() || is_other {
             continue;
         }
@@ -184,11 +186,6 @@ pub(crate) fn private_name(source: SourceId, known: &mut Conclusions<'_>) {
             });
         }
     }
-}
-
-/// Whether a part of a name is hidden, as those of actions and of service introspection are.
-fn is_hidden(topic: &str) -> bool {
-    topic.split('/').any(|part| part.starts_with('_'))
 }
 
 /// Nodes by name.

@@ -55,7 +55,7 @@ impl Evaluator<'_> {
     /// are unknown.
     fn opaque(&mut self, arguments: &Arguments) -> Tree {
         let function = match arguments.get(0, "function") {
-            Some(Function(name)) => self.function(name),
+            Some(Function(name)) => self.functions.get(name).copied(),
             _ => None,
         };
         let Some(function) = function else {
