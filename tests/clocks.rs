@@ -378,14 +378,18 @@ fn the_offset_of_a_clock_is_estimated_from_common_messages() {
     );
 }
 
-/// The headlines of a mission, each with its time in seconds.
+/// The headlines of a mission, each with its time in seconds, sorted.
 fn headlines(mission: &Mission) -> Vec<(Kind, String, i64)> {
     let all = mission.log.headlines(mission.span).map(|(_, event)| {
-        let (node, topic) = mission.elements.names(event.what);
+        let (node, topic) = mission.elements.ends(event.what);
+        let node = node.map(|id| mission.elements.nodes[id].name.as_str());
+        let topic = topic.map(|id| mission.elements.topics[id].name.as_str());
         let name = format!("{} {}", node.unwrap_or_default(), topic.unwrap_or_default());
         (event.kind, name, mission.offset(event.time) / SECOND)
     });
-    all.collect()
+    let mut all: Vec<_> = all.collect();
+    all.sort();
+    all
 }
 
 #[test]

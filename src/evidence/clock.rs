@@ -185,6 +185,9 @@ const SHARE: usize = 80;
 /// The largest difference between the offsets of two messages, in nanoseconds: they take different paths to
 /// the recorders, over a network within some ten milliseconds. Smaller offsets than this do not change a window.
 pub(crate) const NEAR_NS: i64 = 50_000_000;
+/// The longest time after which a merged recording repeats a message, in nanoseconds: a simulation that is set back repeats its messages
+/// later, and the clocks of most computers are less apart.
+const MERGED_NS: i64 = 5_000_000_000;
 
 /// The messages that two recordings have in common, and the offset of a recorder's clock.
 #[derive(Clone, Copy, Debug)]
@@ -361,7 +364,8 @@ pub(crate) fn merged(
                 .min_by_key(|of| of.1)
                 .is_some_and(|of| of.1.0 > UNSET_DAYS * DAY)
     } else {
-        topics.len() > TOPICS && topics.len() * 4 >= many_topics
+        let is_some = topics.len() > TOPICS && topics.len() * 4 >= many_topics;
+        is_some && usual <= MERGED_NS
     };
     if !is_merged {
         return Ok(Vec::new());
