@@ -317,8 +317,7 @@ fn offset(
         other,
         ahead,
         messages,
-        is_one_robot: (is_set || is_one_run)
-            && (is_stamped || topics.len() + usize::from(is_one_run) > TOPICS),
+        is_one_robot: (is_set || is_one_run) && (is_stamped || topics.len() > TOPICS),
     })
 }
 
