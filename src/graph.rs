@@ -34,7 +34,7 @@ pub(crate) use elements::Wiring;
 pub use elements::{
     Edge, EdgeId, Element, Elements, Existence, Node, NodeId, PerElement, Topic, TopicId,
 };
-pub(crate) use history::{History, Record, made, traffic, unread};
+pub(crate) use history::{History, Record, made, parts, traffic, unread};
 use history::{Life, Sending};
 pub(crate) use windowed::{TopicCount, Windowed, counts, graphs};
 

@@ -378,6 +378,115 @@ fn the_offset_of_a_clock_is_estimated_from_common_messages() {
     );
 }
 
+/// The headlines of a mission, each with its time in seconds, sorted.
+fn headlines(mission: &Mission) -> Vec<(Kind, String, i64)> {
+    let all = mission.log.headlines(mission.span).map(|(_, event)| {
+        let (node, topic) = mission.elements.ends(event.what);
+        let node = node.map(|id| mission.elements.nodes[id].name.as_str());
+        let topic = topic.map(|id| mission.elements.topics[id].name.as_str());
+        let name = format!("{} {}", node.unwrap_or_default(), topic.unwrap_or_default());
+        (event.kind, name, mission.offset(event.time) / SECOND)
+    });
+    let mut all: Vec<_> = all.collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn recordings_that_were_merged_and_sorted_count_once() {
+    let healthy = Healthy::new();
+    let alone = mission(&[healthy.copy(|_, at| Some(at))], |_, _| {});
+    for late in [4_000_000, 300_000_000] {
+        // A second recorder of every second topic, over most of the time.
+        let covered = healthy.length / 50..healthy.length / 10 * 9;
+        let is_second =
+            |topic: &str| healthy.topics.iter().position(|t| t == topic).unwrap() % 2 == 0;
+        let again = |topic: &str, at: i64| {
+            let jitter = at % 5_000_000;
+            (is_second(topic) && covered.contains(&at)).then_some(at + late + jitter)
+        };
+        let mut both = healthy.appended(again);
+        both.messages.sort_by_key(|message| message.1);
+        let merged = mission(&[both], |_, _| {});
+        let says = |text: &str| merged.notices.iter().any(|n| n.text.contains(text));
+        assert!(
+            says("messages of `0.bag`, recorded twice"),
+            "{:?}",
+            merged.notices
+        );
+        assert_eq!(headlines(&merged), headlines(&alone));
+    }
+    // A camera that sends every image twice is one recorder.
+    let mut bag = Recording::default();
+    for topic in ["/image", "/info"] {
+        let place = bag.publisher("/camera", topic, "std_msgs/UInt16");
+        for at in 0..600_i64 {
+            let number = u16::try_from(at / 2).unwrap().to_le_bytes();
+            bag.messages
+                .push((place, ORIGIN + at * SECOND / 10, number.to_vec()));
+        }
+    }
+    let camera = mission(&[bag], |_, _| {});
+    assert!(
+        !camera
+            .notices
+            .iter()
+            .any(|n| n.text.contains("recorded twice"))
+    );
+}
+
+#[test]
+fn of_two_recorders_that_split_their_recordings_each_ends_with_its_last_part() {
+    let healthy = Healthy::new();
+    let (length, ahead) = (healthy.length, 3_300_000_000);
+    // The first takes all topics and ends sooner, the second half of them, by a clock that is ahead.
+    let end = length / 20 * 17;
+    let part = |from: i64, to: i64| healthy.copy(|_, at| (from..to).contains(&at).then_some(at));
+    let second = |from: i64, to: i64| {
+        healthy.copy(|topic, at| {
+            let is_in = healthy.is_first(topic) && (from..to).contains(&at);
+            is_in.then_some(at + ahead + at % 5_000_000)
+        })
+    };
+    let begin = length / 10;
+    let parts: Vec<Recording> = (0..3)
+        .map(|k| part(end * k / 3, end * (k + 1) / 3))
+        .chain((0..4).map(|k| {
+            let at = |k: i64| begin + (length - begin) * k / 4;
+            second(at(k), at(k + 1))
+        }))
+        .collect();
+    let split = mission(&parts, |_, _| {});
+    let whole = mission(&[part(0, end), second(begin, length)], |_, _| {});
+    assert_eq!(headlines(&split), headlines(&whole));
+    let apart = split
+        .notices
+        .iter()
+        .filter(|n| n.text.contains("3.3 s ahead"));
+    assert_eq!(apart.count(), 4);
+}
+
+#[test]
+fn two_recorders_in_simulated_time_are_of_one_run_if_a_node_started_once() {
+    let healthy = Healthy::new();
+    let simulated = |from: i64| {
+        let mut all = healthy.copy(|_, at| (at >= from).then_some(at));
+        all.messages
+            .iter_mut()
+            .for_each(|message| message.1 -= healthy.begin - 100 * SECOND);
+        all
+    };
+    let alone = mission(&[simulated(0)], |_, _| {});
+    let both = mission(&[simulated(0), simulated(healthy.length / 3)], |_, _| {});
+    let says = |text: &str| both.notices.iter().any(|n| n.text.contains(text));
+    assert!(
+        says("messages of `1.bag`, recorded twice"),
+        "{:?}",
+        both.notices
+    );
+    assert_eq!(headlines(&both), headlines(&alone));
+}
+
 #[test]
 fn what_two_recorders_recorded_counts_once() {
     let recorder = |late: i64, ends: i64| {

@@ -117,6 +117,17 @@ fn a_crash_is_drawn_before_during_and_after() {
 }
 
 #[test]
+fn two_senders_are_news_only_of_a_topic_that_changes_hands() {
+    let says = |words: &str| {
+        let frames = example("warehouse.bag", None).frames;
+        frames.iter().filter(|f| f.note.contains(words)).count()
+    };
+    // `/robot1/cmd_vel` is handed over to `/robot1/dock_controller` later; several nodes send `/robot1/diagnostics`.
+    assert_eq!(says("controller and emergency_stop both send"), 1);
+    assert_eq!(says("both send"), 1);
+}
+
+#[test]
 fn an_element_shows_the_rates_of_its_event_instead_of_their_mean() {
     let view = example("warehouse.bag", Some("10"));
     let mut events = 0;

@@ -4,8 +4,6 @@
 //! The first reading detects where time goes back, in file order; if it does, a second reading shifts each run to
 //! after the previous one.
 
-use std::collections::BTreeSet;
-
 use crate::bag::model::{ConnectionId, Message, Sink};
 use crate::base::ids::ById;
 use crate::base::rhythm::{OUT_OF_ORDER_NS, RUN_FEWEST, RUN_SHARE};
@@ -22,14 +20,11 @@ pub(crate) struct Seam {
     pub(crate) after: Stamp,
     /// The number of messages before it; 0 for connections that are described after it.
     counts: ById<ConnectionId, u64>,
-    /// The connections that the new run has in common with the previous one, if their messages are the same: a script appended a
-    /// recording of the same time. Empty if the clock was set back.
-    pub(crate) repeated: BTreeSet<ConnectionId>,
 }
 
 impl Seam {
     /// The number of a connection's messages before it.
-    pub(crate) fn count_before(&self, connection: ConnectionId) -> u64 {
+    fn count_before(&self, connection: ConnectionId) -> u64 {
         self.counts.get(connection).copied().unwrap_or(0)
     }
 }
@@ -129,7 +124,6 @@ impl<'a> Watched<'a> {
                 before: self.last,
                 after: time,
                 counts,
-                repeated: BTreeSet::new(),
             };
             self.suspect = Some(Suspect {
                 seam,
@@ -204,7 +198,7 @@ pub(crate) struct ClockFall {
     pub(crate) length: i64,
 }
 
-/// A sink that shifts each run to after the previous one, without messages that this repeats.
+/// A sink that shifts each run to after the previous one.
 pub(crate) struct Straightened<'a> {
     sink: &'a mut dyn Sink,
     seams: &'a [Seam],
@@ -212,10 +206,6 @@ pub(crate) struct Straightened<'a> {
     shifts: Vec<i64>,
     /// The number of stamps and of messages per connection so far.
     counts: ById<ConnectionId, [u64; 2]>,
-    /// The first and the last time of the stamps and of the messages per connection so far.
-    covered: ById<ConnectionId, [Option<(Stamp, Stamp)>; 2]>,
-    /// The number of messages that were left out.
-    pub(crate) left_out: u64,
 }
 
 /// The shifts of all runs; 0 for the first.
@@ -225,8 +215,7 @@ fn shifts(seams: &[Seam]) -> Vec<i64> {
         let before = shifts[shifts.len() - 1];
         // The next nanosecond: the real time between the runs is unknown.
         let back = seam.before.since(seam.after).saturating_add(1);
-        let is_run = seam.repeated.is_empty();
-        shifts.push(before.saturating_add(if is_run { back } else { 0 }));
+        shifts.push(before.saturating_add(back));
     }
     shifts
 }
@@ -237,8 +226,7 @@ pub(crate) fn falls(seams: &[Seam], is_moved: bool) -> impl Iterator<Item = Cloc
         time: seam.before.plus(if is_moved { shift } else { 0 }),
         length: seam.before.since(seam.after),
     };
-    let all = seams.iter().zip(shifts(seams));
-    all.filter(|(seam, _)| seam.repeated.is_empty()).map(fall)
+    seams.iter().zip(shifts(seams)).map(fall)
 }
 
 impl<'a> Straightened<'a> {
@@ -248,34 +236,16 @@ impl<'a> Straightened<'a> {
             seams,
             shifts: shifts(seams),
             counts: ById::default(),
-            covered: ById::default(),
-            left_out: 0,
         }
     }
 
-    /// The shifted time of a connection's next stamp or message; `None` if it repeats one.
-    fn moved(&mut self, connection: ConnectionId, kind: usize, time: Stamp) -> Option<Stamp> {
+    /// The shifted time of a connection's next stamp or message.
+    fn moved(&mut self, connection: ConnectionId, kind: usize, time: Stamp) -> Stamp {
         let next = &mut self.counts.grown(connection)[kind];
         let count = *next;
         *next += 1;
         let behind = |seam: &Seam| seam.count_before(connection) <= count;
-        let run = self.seams.partition_point(behind);
-        let seam = run.checked_sub(1).and_then(|at| self.seams.get(at));
-        let again = seam.filter(|seam| seam.repeated.contains(&connection));
-        let covered = &mut self.covered.grown(connection)[kind];
-        match (covered, again) {
-            // A single message is latched, which a recorder gets when it begins.
-            (Some((from, to)), Some(seam))
-                if (*from..=*to).contains(&time) || from == to && time <= seam.before =>
-            {
-                return None;
-            }
-            // The new run may begin before the previous one.
-            (Some((from, to)), Some(_)) => *to = time.max(*to).max(*from),
-            (Some((from, to)), None) => (*from, *to) = (time.min(*from), time.max(*to)),
-            (covered, _) => *covered = Some((time, time)),
-        }
-        Some(time.plus(self.shifts[run]))
+        time.plus(self.shifts[self.seams.partition_point(behind)])
     }
 }
 
@@ -285,15 +255,17 @@ impl Sink for Straightened<'_> {
     }
 
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
+        if self.seams.is_empty() {
+            return self.sink.stamps(connection, stamps, sizes);
+        }
         let moved = stamps.iter().map(|time| self.moved(connection, 0, *time));
-        let moved: Vec<Option<Stamp>> = moved.collect();
-        self.left_out += pass(&mut *self.sink, connection, &moved, sizes);
+        let moved: Vec<Stamp> = moved.collect();
+        self.sink.stamps(connection, &moved, sizes);
     }
 
     fn message(&mut self, message: Message<'_>) {
-        if let Some(time) = self.moved(message.connection, 1, message.time) {
-            self.sink.message(Message { time, ..message });
-        }
+        let time = self.moved(message.connection, 1, message.time);
+        self.sink.message(Message { time, ..message });
     }
 }
 
@@ -370,26 +342,6 @@ mod tests {
         feed(parts, &mut moved);
         assert_eq!(kept.0[0], (0..60).chain(59..109).collect::<Vec<_>>());
         assert_eq!(kept.0[1], [0, 30, 77]);
-    }
-
-    #[test]
-    fn a_run_that_repeats_the_previous_one_is_left_out() {
-        let parts: Parts<'_> = &[
-            &[(0, (10..60).collect()), (1, vec![10])],
-            &[(0, (5..70).collect()), (1, vec![5]), (3, vec![40])],
-        ];
-        let mut found = seams(parts);
-        found[0].repeated = [0, 1].map(ConnectionId).into();
-        let mut kept = Kept::default();
-        let mut straight = Straightened::new(&found, &mut kept);
-        feed(parts, &mut straight);
-        assert_eq!(straight.left_out, 51);
-        assert_eq!(
-            kept.0[0],
-            (10..60).chain(5..10).chain(60..70).collect::<Vec<_>>()
-        );
-        assert_eq!((&kept.0[1][..], &kept.0[3][..]), (&[10][..], &[40][..]));
-        assert_eq!(falls(&found, true).count(), 0);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The clocks of recorders: credible times, as a few messages far from all others were recorded with a clock that was not set;
 //! and the messages that several recorders have in common, which show by how much their clocks differ.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::io;
 
 use crate::base::budget;
@@ -9,10 +9,11 @@ use crate::base::ids::{ById, grouped};
 use crate::base::name::NodeName;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::GAP_NS;
+use crate::base::role::start;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::inference::Stream;
 use crate::evidence::observation::Observations;
-use crate::evidence::times::Calendar;
+use crate::evidence::times::{Calendar, Timed};
 
 pub(crate) const DAY: i64 = 86_400_000_000_000;
 /// The distance in days beyond which times count as far from all others: no mission has a pause of a year.
@@ -184,6 +185,9 @@ const SHARE: usize = 80;
 /// The largest difference between the offsets of two messages, in nanoseconds: they take different paths to
 /// the recorders, over a network within some ten milliseconds. Smaller offsets than this do not change a window.
 pub(crate) const NEAR_NS: i64 = 50_000_000;
+/// The longest time after which a merged recording repeats a message, in nanoseconds: a simulation that is set back repeats its messages
+/// later, and the clocks of most computers are less apart.
+const MERGED_NS: i64 = 5_000_000_000;
 
 /// The messages that two recordings have in common, and the offset of a recorder's clock.
 #[derive(Clone, Copy, Debug)]
@@ -195,8 +199,8 @@ pub(crate) struct ClockOffset {
     pub(crate) ahead: i64,
     /// The number of messages that show it.
     pub(crate) messages: usize,
-    /// Whether both recorded one robot: in wall time, with stamps or on several topics. In simulated time, two runs may have equal
-    /// messages at equal times.
+    /// Whether both recorded one robot: with stamps or on several topics, and in wall time or with a node of the same start in its name.
+    /// Otherwise two runs of a simulation may have equal messages at equal times.
     pub(crate) is_one_robot: bool,
 }
 
@@ -207,120 +211,199 @@ impl ClockOffset {
     }
 }
 
-/// The times of contents that occur once, by their hashes, and whether they carry stamps; `None` for those that occur more often.
-type Times = BTreeMap<u32, Option<(Stamp, bool)>>;
-/// The contents of a bag, by topic and publisher: two cameras may send the same numbers.
-type Contents<'a> = BTreeMap<(&'a str, Option<&'a str>), Times>;
+/// The messages of one topic and publisher: two cameras may send the same numbers.
+struct Contents<'a> {
+    topic: &'a str,
+    /// Whether they carry stamps.
+    stamped: bool,
+    /// The hash of each content, its time, and its stream; sorted.
+    messages: Vec<(u32, Stamp, usize)>,
+}
+
+/// The messages of some streams, without latched ones.
+fn contents<'a>(
+    streams: &'a [Stream],
+    facts: &Observations,
+    is_in: impl Fn(&Stream) -> bool,
+) -> io::Result<Vec<Contents<'a>>> {
+    let all = facts.payloads.somes();
+    let all = all.filter(|(at, _)| !streams[*at].latched && is_in(&streams[*at]));
+    let all = grouped(all.map(|(at, own)| {
+        let of = &streams[at].connection;
+        let publisher = of.publisher.as_ref().map(NodeName::as_str);
+        ((of.topic.as_str(), publisher), (at, *own))
+    }));
+    let topics = all.into_iter().map(|((topic, _), own)| {
+        let (of, series): (Vec<usize>, Vec<_>) = own.into_iter().unzip();
+        let mut messages = Vec::new();
+        let add = |timed: Timed| messages.push((timed.size, timed.time, of[timed.series]));
+        facts.times.merge(&series, add)?;
+        messages.sort_unstable();
+        let stamped = of.iter().any(|at| facts.ages.some(*at).is_some());
+        Ok(Contents {
+            topic,
+            stamped,
+            messages,
+        })
+    });
+    topics.collect()
+}
+
+/// The nanoseconds between a message in two bags, its topic, and whether it carries a stamp and is in wall time.
+type Lag<'a> = (i64, &'a str, [bool; 2]);
 
 /// The pairs of bags that have messages in common, each bag with those before it.
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
 pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Vec<ClockOffset>> {
-    let last = streams.iter().map(|stream| stream.bag).max();
-    let mut bags: Vec<Contents<'_>> = vec![Contents::new(); last.map_or(0, |last| last + 1)];
-    if bags.len() < 2 {
+    if streams.iter().all(|stream| stream.bag == 0) {
         return Ok(Vec::new());
     }
-    for (at, series) in facts.payloads.somes() {
-        let stream = &streams[at];
-        if stream.latched {
-            continue;
+    let mut lags: BTreeMap<[usize; 2], Vec<Lag<'_>>> = BTreeMap::new();
+    for of in contents(streams, facts, |_| true)? {
+        for same in of.messages.chunk_by(|a, b| a.0 == b.0) {
+            // What a bag contains more often is a constant.
+            let mut times: BTreeMap<usize, Option<Stamp>> = BTreeMap::new();
+            for (_, time, at) in same {
+                let own = times.entry(streams[*at].bag).or_insert(Some(*time));
+                *own = own.filter(|own| own == time);
+            }
+            let times = times
+                .into_iter()
+                .filter_map(|(bag, time)| Some((bag, time?)));
+            let times: Vec<(usize, Stamp)> = times.collect();
+            for (at, (bag, time)) in times.iter().enumerate() {
+                for (other, before) in &times[..at] {
+                    let is = [of.stamped, time.min(before).0 > UNSET_DAYS * DAY];
+                    let lags = lags.entry([*bag, *other]).or_default();
+                    lags.push((time.since(*before), of.topic, is));
+                }
+            }
         }
-        let of = &stream.connection;
-        let publisher = of.publisher.as_ref().map(NodeName::as_str);
-        let contents = bags[stream.bag].entry((of.topic.as_str(), publisher));
-        let contents = contents.or_default();
-        let stamped = facts.ages.some(at).is_some();
-        facts.times.merge(&[*series], |timed| {
-            let time = contents.entry(timed.size);
-            let time = time.or_insert(Some((timed.time, stamped)));
-            *time = time.filter(|(time, _)| *time == timed.time);
-        })?;
     }
-    let filled = (0..bags.len()).filter(|bag| !bags[*bag].is_empty());
-    let filled: Vec<usize> = filled.collect();
-    let mut found = Vec::new();
-    for (at, bag) in filled.iter().copied().enumerate() {
-        let before = filled[..at].iter().copied();
-        found.extend(before.filter_map(|other| {
-            let (ahead, messages, is_one_robot) = offset(&bags[other], &bags[bag])?;
-            Some(ClockOffset {
-                bag,
-                other,
-                ahead,
-                messages,
-                is_one_robot,
-            })
-        }));
-    }
-    Ok(found)
+    // No other run has a node with the time of its start in its name.
+    let started = streams.iter().filter_map(|stream| {
+        let name = stream.connection.publisher.as_ref()?.as_str();
+        start(name).map(|_| (name, stream.bag))
+    });
+    let started: BTreeSet<(&str, usize)> = started.collect();
+    let is_one_run = |[one, other]: [usize; 2]| {
+        let mut all = started.iter().filter(|(_, bag)| *bag == one);
+        all.any(|(name, _)| started.contains(&(name, other)))
+    };
+    let all = lags.into_iter();
+    Ok(all
+        .filter_map(|(bags, lags)| offset(bags, lags, is_one_run(bags)))
+        .collect())
 }
 
-/// Whether a later part of a bag, between two times, repeats messages of the part before: at least half of what `is_again` says to be in both.
+/// The common messages of two bags with these times between them; `None` without agreement.
+fn offset(
+    [bag, other]: [usize; 2],
+    mut lags: Vec<Lag<'_>>,
+    is_one_run: bool,
+) -> Option<ClockOffset> {
+    lags.sort_unstable();
+    let ahead = lags.get(lags.len() / 2)?.0;
+    let near = lags.iter().filter(|lag| (lag.0 - ahead).abs() <= NEAR_NS);
+    let messages = near.clone().count();
+    let is_stamped = near.clone().filter(|lag| lag.2[0]).count() >= FEWEST;
+    let is_set = near.clone().all(|lag| lag.2[1]);
+    let topics: BTreeSet<&str> = near.map(|lag| lag.1).collect();
+    let is_clear = messages >= FEWEST && messages * 100 >= lags.len() * SHARE;
+    (is_clear && (is_stamped || topics.len() >= TOPICS)).then(|| ClockOffset {
+        bag,
+        other,
+        ahead,
+        messages,
+        is_one_robot: (is_set || is_one_run) && (is_stamped || topics.len() > TOPICS),
+    })
+}
+
+/// The messages of a bag that repeat others, by stream and time, each as an interval, since the recordings of two recorders were merged:
+/// on more than two topics, and a quarter of all, most contents that are not constant occur twice, with one difference of time. If a
+/// script appended one recording to another, time goes back in the file (`seams` times), and it is enough that messages of one topic were
+/// recorded again at once.
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
-pub(crate) fn repeats(
+pub(crate) fn merged(
     (streams, facts): (&[Stream], &Observations),
-    span: Span,
-    is_again: impl Fn(&Stream) -> bool,
-) -> io::Result<bool> {
-    let all = facts.payloads.somes();
-    let all = all.map(|(at, own)| (&streams[at], *own));
-    let all = all.filter(|(stream, _)| !stream.latched && is_again(stream));
-    let series = grouped(all.map(|(of, own)| ((of.topic, of.publisher), own)));
-    let (mut all, mut copies) = (0, 0);
-    for own in series.values() {
-        let mut contents = Vec::new();
-        facts.times.merge(own, |timed| {
-            contents.extend(
-                span.contains(timed.time)
-                    .then_some((timed.size, timed.time)),
-            );
-        })?;
-        contents.sort_unstable();
-        // What occurs more often is a constant.
-        let single = contents
-            .chunk_by(|a, b| a.0 == b.0)
-            .filter(|same| same.len() <= 2);
-        for same in single {
-            let is_near = same
-                .last()
-                .is_some_and(|last| last.1.since(same[0].1) <= NEAR_NS);
-            all += same.len();
-            copies += usize::from(is_near && same.len() == 2);
+    bag: usize,
+    seams: usize,
+) -> io::Result<Vec<(usize, Span)>> {
+    let all = contents(streams, facts, |stream| stream.bag == bag)?;
+    let topics = all.iter().map(|of| {
+        let (mut many, mut lags) = (0, Vec::new());
+        let same = of.messages.chunk_by(|a, b| a.0 == b.0);
+        for same in same.filter(|same| same.len() <= (seams + 1).max(2)) {
+            many += 1;
+            lags.extend(same.windows(2).map(|two| two[1].1.since(two[0].1)));
+        }
+        (of, many, lags)
+    });
+    let mut topics: Vec<_> = topics.filter(|(_, many, _)| *many >= FEWEST).collect();
+    let many_topics = topics.len();
+    topics.retain(|(_, many, lags)| lags.len() >= FEWEST && lags.len() * 4 >= *many);
+    let mut lags: Vec<i64> = topics.iter().flat_map(|(.., lags)| lags).copied().collect();
+    lags.sort_unstable();
+    let Some(usual) = lags.get(lags.len() / 2).copied() else {
+        return Ok(Vec::new());
+    };
+    topics.retain(|(.., lags)| {
+        let near = lags.iter().filter(|lag| (**lag - usual).abs() <= NEAR_NS);
+        near.count() * 100 >= lags.len() * SHARE
+    });
+    let is_merged = if seams > 0 {
+        // Two runs of a simulation may have equal messages at equal times.
+        let times = topics.iter().flat_map(|(of, ..)| &of.messages);
+        usual <= NEAR_NS
+            && times
+                .min_by_key(|of| of.1)
+                .is_some_and(|of| of.1.0 > UNSET_DAYS * DAY)
+    } else {
+        let is_some = topics.len() > TOPICS && topics.len() * 4 >= many_topics;
+        is_some && usual <= MERGED_NS
+    };
+    if !is_merged {
+        return Ok(Vec::new());
+    }
+    // The messages of a fast topic may be constant.
+    let mut late: Vec<i64> = lags.iter().map(|lag| (lag - usual).abs()).collect();
+    late.sort_unstable();
+    let near = late[late.len() * 9 / 10]
+        .saturating_mul(3)
+        .clamp(NEAR_NS / 50, NEAR_NS);
+    let mut again = Vec::new();
+    for same in all
+        .iter()
+        .flat_map(|of| of.messages.chunk_by(|a, b| a.0 == b.0))
+    {
+        // Those before that none repeats yet.
+        let mut first: VecDeque<Stamp> = VecDeque::new();
+        for (_, time, at) in same.iter().copied() {
+            while first
+                .front()
+                .is_some_and(|first| time.since(*first) > usual + near)
+            {
+                first.pop_front();
+            }
+            match first
+                .front()
+                .filter(|first| time.since(**first) >= usual - near)
+            {
+                Some(before) => {
+                    // Of two messages at one time, one stays.
+                    again.push((at, Span::new(time, time.plus(i64::from(*before < time)))));
+                    first.pop_front();
+                }
+                None => first.push_back(time),
+            }
         }
     }
-    let is_set = span.start.0 > UNSET_DAYS * DAY;
-    Ok(is_set && copies >= FEWEST && copies * 4 >= all)
-}
-
-/// The delay of the common messages in the second recording, their number, and whether both recorded one robot; `None` without
-/// agreement.
-fn offset(one: &Contents<'_>, other: &Contents<'_>) -> Option<(i64, usize, bool)> {
-    let both = other
-        .iter()
-        .filter_map(|(key, own)| Some((key.0, one.get(key)?, own)));
-    let both = both.flat_map(|(topic, one, own)| {
-        own.iter().filter_map(move |(hash, time)| {
-            let (before, stamped) = (*one.get(hash)?)?;
-            Some(((*time)?.0.since(before), topic, stamped))
-        })
-    });
-    let mut lags: Vec<(i64, &str, bool)> = both.collect();
-    lags.sort_unstable();
-    let median = lags.get(lags.len() / 2)?.0;
-    let near = lags.iter().filter(|lag| (lag.0 - median).abs() <= NEAR_NS);
-    let agreeing = near.clone().count();
-    let is_stamped = near.clone().filter(|lag| lag.2).count() >= FEWEST;
-    let topics: BTreeSet<&str> = near.map(|lag| lag.1).collect();
-    let times = [one, other].into_iter().flat_map(BTreeMap::values);
-    let mut times = times.flat_map(BTreeMap::values).flatten();
-    let is_set = times.all(|(time, _)| time.0 > UNSET_DAYS * DAY);
-    let is_one_robot = is_set && (is_stamped || topics.len() > TOPICS);
-    let is_clear = agreeing >= FEWEST && agreeing * 100 >= lags.len() * SHARE;
-    (is_clear && (is_stamped || topics.len() >= TOPICS)).then_some((median, agreeing, is_one_robot))
+    again.sort_unstable_by_key(|(at, span)| (*at, span.start));
+    Ok(again)
 }
 
 #[cfg(test)]
@@ -433,36 +516,44 @@ mod tests {
     mod offsets {
         use super::super::*;
 
-        fn contents(times: &[i64], stamped: bool) -> Contents<'static> {
-            let mut all = Contents::new();
-            for (hash, time) in (0..).zip(times) {
-                let own = all.entry((["/tf", "/odom"][hash as usize % 2], None));
-                let time = Some((Stamp(time * 1_000_000), stamped));
-                own.or_default().insert(hash, time);
-            }
-            all
+        /// The times between messages of two topics at these times, in milliseconds.
+        fn lags(one: &[i64], other: &[i64], stamped: bool) -> Vec<Lag<'static>> {
+            let all = one
+                .iter()
+                .zip(other)
+                .zip(["/tf", "/odom"].into_iter().cycle());
+            let lag = |((before, time), topic): ((&i64, &i64), _)| {
+                ((time - before) * 1_000_000, topic, [stamped, false])
+            };
+            all.map(lag).collect()
+        }
+
+        fn found(lags: Vec<Lag<'_>>, is_one_run: bool) -> Option<(i64, usize, bool)> {
+            let found = offset([1, 0], lags, is_one_run)?;
+            Some((found.ahead, found.messages, found.is_one_robot))
         }
 
         #[test]
         fn an_offset_needs_messages_that_agree() {
             let one: Vec<i64> = (0..20).map(|n| n * 100).collect();
             let later: Vec<i64> = one.iter().map(|t| t + 350 + t % 7).collect();
-            let plain = |times: &[i64]| contents(times, false);
-            let (ahead, messages, _) = offset(&plain(&one), &plain(&later)).unwrap();
+            let (ahead, messages, _) = found(lags(&one, &later, false), false).unwrap();
             assert_eq!((ahead / 10_000_000, messages), (35, 20));
             let wild: Vec<i64> = one.iter().map(|t| t * 2).collect();
-            assert_eq!(offset(&plain(&one), &plain(&wild)), None);
-            assert_eq!(offset(&plain(&one[..5]), &plain(&later)), None);
-            let only = |times: &[i64], stamped| {
-                let mut all = contents(times, stamped);
-                all.retain(|key, _| key.0 == "/tf");
+            assert_eq!(found(lags(&one, &wild, false), false), None);
+            assert_eq!(found(lags(&one[..5], &later, false), false), None);
+            let only = |stamped| {
+                let mut all = lags(&one, &later, stamped);
+                all.retain(|lag| lag.1 == "/tf");
                 all
             };
-            let found = offset(&only(&one, false), &only(&later, false));
-            assert_eq!(found, None);
-            let found = offset(&only(&one, true), &only(&later, true)).unwrap();
-            // In simulated time, which may be another run.
-            assert_eq!((found.1, found.2), (10, false));
+            assert_eq!(found(only(false), false), None);
+            // In simulated time, which may be another run, unless a node in both started once.
+            let both = [false, true].map(|is_one_run| found(only(true), is_one_run).unwrap());
+            assert_eq!(
+                both.map(|found| (found.1, found.2)),
+                [(10, false), (10, true)]
+            );
         }
     }
 }

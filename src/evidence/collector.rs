@@ -442,6 +442,8 @@ impl Sink for BagSink<'_> {
 pub struct Recorded {
     pub(crate) streams: Vec<Stream>,
     pub(crate) messages: Stamps,
+    /// The bags of each recording, if that is known from messages that were left out since.
+    pub(crate) parts: Vec<Vec<usize>>,
     /// The numbers in the headers of streams, by index, as far as they were read.
     pub(crate) numbers: ById<usize, Option<Numbers>>,
     pub(crate) facts: Observations,

@@ -38,7 +38,7 @@ pub(crate) fn judge(
             for at in of_bag {
                 let stream = &streams[*at];
                 if let Some(node) = stream.publisher
-                    && named.by_others(stream.topic, node)
+                    && named.nodes(stream.topic).any(|name| name != node)
                     && !is_alone(stream, node, (&named, facts), (messages, numbers.some(*at)))?
                 {
                     streams[*at].trust = Reliability::First;
@@ -97,10 +97,6 @@ impl NamedTopics {
     /// The nodes that name a topic as their own.
     fn nodes(&self, topic: Name) -> impl Iterator<Item = Name> + '_ {
         self.topics.get(topic).into_iter().flatten().copied()
-    }
-
-    fn by_others(&self, topic: Name, node: Name) -> bool {
-        self.nodes(topic).any(|name| name != node)
     }
 }
 

@@ -31,9 +31,8 @@ pub(crate) fn conclude(known: &mut Conclusions<'_>) {
         let named = known.publishers(topic).count();
         let offered = known.offers(topic).map_or(0, |n| n as usize);
         let missing = offered.saturating_sub(named);
-        let is_owned = known
-            .publishers(topic)
-            .any(|node| is_box(&known.text(node)));
+        let is_box = |node| known.text(node).ends_with(" ?");
+        let is_owned = known.publishers(topic).any(is_box);
         if missing == 0 || is_owned {
             continue;
         }
@@ -80,11 +79,6 @@ fn times(many: usize) -> String {
     } else {
         String::new()
     }
-}
-
-/// Whether a name is that of a box for an unknown node.
-fn is_box(name: &str) -> bool {
-    name.ends_with(" ?")
 }
 
 /// Adds the box of the only program that publishes the type of a topic, with its other publications and

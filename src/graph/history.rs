@@ -29,6 +29,7 @@ use crate::base::rhythm::{
 };
 use crate::base::time::{Span, Stamp};
 
+pub(crate) use recordings::parts;
 pub(crate) use records::{History, Record, made};
 pub(crate) use restarts::unread;
 pub(crate) use senders::traffic;
@@ -42,6 +43,16 @@ pub struct Bound {
     pub earliest: Stamp,
     /// The latest possible time.
     pub latest: Stamp,
+}
+
+impl Bound {
+    pub(crate) fn new(time: Stamp, earliest: Stamp, latest: Stamp) -> Self {
+        Self {
+            time,
+            earliest,
+            latest,
+        }
+    }
 }
 
 /// One lifetime of an element.

@@ -145,11 +145,6 @@ const MINUTE: Period = match Period::from_nanos(60 * SECOND) {
     None => unreachable!(),
 };
 
-/// The shortest period that covers `nanos` with this many windows.
-fn parts_of(nanos: i64, parts: u32) -> Period {
-    Period::from_nanos(count(nanos, i64::from(parts.max(1)))).unwrap_or(MINUTE)
-}
-
 /// The number of windows of `period` that cover `nanos`, both positive.
 fn count(nanos: i64, period: i64) -> i64 {
     nanos / period + i64::from(nanos % period > 0)
@@ -164,7 +159,9 @@ pub fn divide(division: &Division, span: Span) -> Result<Windows> {
     let period = match division.length {
         Length::Auto => default_period(nanos),
         Length::All => Period::from_nanos(nanos).unwrap_or(MINUTE),
-        Length::Parts(parts) => parts_of(nanos, parts),
+        Length::Parts(parts) => {
+            Period::from_nanos(count(nanos, i64::from(parts.max(1)))).unwrap_or(MINUTE)
+        }
         Length::Fixed(period) => period,
     };
     let step = division.step.unwrap_or(period);

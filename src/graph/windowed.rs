@@ -101,7 +101,8 @@ struct Sent {
 impl Sent {
     fn add(&mut self, arrivals: &Arrivals, window: Span) {
         self.count = self.count.saturating_add(arrivals.count);
-        if arrivals.fills_window() {
+        // Neither begins nor ends in the window.
+        if arrivals.before.is_some() && arrivals.after.is_some() {
             self.throughout = self.throughout.saturating_add(arrivals.count);
         } else if let Some(hz) = arrivals.hz(window) {
             self.others_hz = Some(self.others_hz.unwrap_or(0.0) + hz);
@@ -555,11 +556,6 @@ impl Arrivals {
             after: self.after.filter(|at| at.since(self.last) <= longest),
             ..self
         }
-    }
-
-    /// Whether the sending neither begins nor ends in the window.
-    fn fills_window(&self) -> bool {
-        self.before.is_some() && self.after.is_some()
     }
 
     /// Messages per second in the part of the window in which they are sent: if the sending begins or ends in it, the

@@ -118,15 +118,6 @@ impl ChangeCounts {
 }
 
 impl ConfidenceCounts {
-    fn add(&mut self, confidence: Confidence) {
-        match confidence {
-            Confidence::Measured => self.measured += 1,
-            Confidence::Stated => self.stated += 1,
-            Confidence::Inferred => self.inferred += 1,
-            Confidence::Declared => self.declared += 1,
-        }
-    }
-
     /// The sum of all confidences.
     pub fn total(&self) -> usize {
         self.measured + self.stated + self.inferred + self.declared
@@ -136,9 +127,14 @@ impl ConfidenceCounts {
 impl FromIterator<Confidence> for ConfidenceCounts {
     fn from_iter<T: IntoIterator<Item = Confidence>>(confidences: T) -> Self {
         let mut all = Self::default();
-        confidences
-            .into_iter()
-            .for_each(|confidence| all.add(confidence));
+        for confidence in confidences {
+            *match confidence {
+                Confidence::Measured => &mut all.measured,
+                Confidence::Stated => &mut all.stated,
+                Confidence::Inferred => &mut all.inferred,
+                Confidence::Declared => &mut all.declared,
+            } += 1;
+        }
         all
     }
 }

@@ -3,7 +3,7 @@
 use super::copies::{self, Copies, Rest};
 use super::inputs::{affordable, check_named, each_once, in_time, space_of};
 use super::{Reading, Watch};
-use crate::bag::straight::{self, ClockFall, Straightened, Watched};
+use crate::bag::straight::{self, ClockFall, Seam, Straightened, Watched};
 use crate::bag::{self, Input, OpenOptions, Report, known_span};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
@@ -11,7 +11,7 @@ use crate::base::time::Span;
 use crate::base::words;
 use crate::evidence::clock;
 use crate::evidence::collector::{Collector, Recorded};
-use crate::graph::window;
+use crate::graph::{self, window};
 
 /// The bags of a mission, read.
 pub(super) struct Collected {
@@ -23,19 +23,25 @@ pub(super) struct Collected {
     pub(super) range: Span,
 }
 
-/// Reads every bag once, and again if several recorded one robot; with `verify` by the second, independent reader. Adds the offsets
+/// Reads every bag once, and again if several recorded one robot or two recordings of it were merged; with `verify` by the second, independent reader. Adds the offsets
 /// of clocks that it finds to the reading.
 pub(super) fn collect(
     reading: &mut Reading,
     verify: bool,
     watch: &mut dyn Watch,
 ) -> Result<Collected> {
-    let mut all = once(reading, &Copies::default(), verify, watch)?;
-    let pairs = copies::pairs(reading, &all.inputs, &all.recorded)?;
+    let mut merged = None;
+    let mut all = once(reading, &Copies::default(), &mut merged, verify, watch)?;
+    let parts = graph::parts(&all.recorded);
+    let pairs = copies::pairs(reading, &all.inputs, &all.recorded, &parts)?;
     let (shifts, mut notices) = copies::correct(reading, &pairs, &all.inputs);
     let left_out = copies::copies(&all.recorded, &pairs, &shifts);
     if !notices.is_empty() || !left_out.is_empty() {
-        all = once(reading, &left_out, verify, watch)?;
+        if let Some(merged) = &mut merged {
+            copies::moved(merged, &shifts);
+        }
+        all = once(reading, &left_out, &mut merged, verify, watch)?;
+        all.recorded.parts = parts;
     }
     let offsets = &all.recorded.offsets;
     for of_bag in offsets.chunk_by(|a, b| a.bag == b.bag) {
@@ -46,10 +52,12 @@ pub(super) fn collect(
     Ok(all)
 }
 
-/// Reads every bag once, without messages that another one contains.
+/// Reads every bag once, without messages that another one contains, or that it contains twice (`merged`), which it finds if that is not
+/// known yet.
 fn once(
     reading: &Reading,
     copies: &Copies,
+    merged: &mut Option<Copies>,
     verify: bool,
     watch: &mut dyn Watch,
 ) -> Result<Collected> {
@@ -73,45 +81,43 @@ fn once(
         .map(|span| window::range(&reading.division, span))
         .transpose()?;
     let spaces: Vec<String> = inputs.iter().map(|i| space_of(reading, i)).collect();
-    let mut collector = Collector::new(affordable(reading));
-    let mut reports = Vec::new();
-    let mut seams = Vec::new();
-    let (mut before, mut size) = (0, 0);
-    let mut left_out = Vec::new();
-    for (bag, (reader, space)) in readers.iter_mut().zip(&spaces).enumerate() {
-        let mut progress = |done, total: u64| {
-            size = total;
-            watch.progress(before + done, whole.max(before + total));
-        };
-        let mut sink = collector.bag_in(space, &mut progress);
-        let mut rest = Rest::new(&mut sink, copies, bag);
-        let mut watched = Watched::new(&mut rest);
-        reports.push(reader.read(range, &mut watched)?);
-        seams.push(watched.seams());
-        left_out.push(rest.left_out);
-        before += std::mem::take(&mut size);
-    }
-    let is_straight = seams.iter().all(Vec::is_empty);
-    let is_pipe = inputs.iter().any(Input::is_pipe);
-    if !is_straight && !is_pipe {
-        let first = collector.finish()?;
-        for (bag, seams) in seams.iter_mut().enumerate() {
-            for seam in seams {
-                copies::examine(reading, &inputs[bag], (&first, bag), seam)?;
-            }
-        }
-        collector = Collector::new(affordable(reading));
-        let all = readers.iter_mut().zip(&spaces).zip(&seams);
-        for (bag, ((reader, space), seams)) in all.enumerate() {
-            let mut progress = |done, total| watch.progress(done, total);
+    let mut pass = |seams: &[Vec<Seam>], merged: &Copies| {
+        let mut collector = Collector::new(affordable(reading));
+        let (mut before, mut size, mut all) = (0, 0, Vec::new());
+        for (bag, (reader, space)) in readers.iter_mut().zip(&spaces).enumerate() {
+            let mut progress = |done, total: u64| {
+                size = total;
+                watch.progress(before + done, whole.max(before + total));
+            };
             let mut sink = collector.bag_in(space, &mut progress);
             let mut rest = Rest::new(&mut sink, copies, bag);
+            let seams = seams.get(bag).map_or(&[][..], Vec::as_slice);
             let mut straight = Straightened::new(seams, &mut rest);
-            reader.read(range, &mut straight)?;
-            left_out[bag] = straight.left_out + rest.left_out;
+            let mut watched = Watched::new(&mut straight);
+            let mut once = Rest::new(&mut watched, merged, bag);
+            let report = reader.read(range, &mut once)?;
+            let again = once.left_out;
+            all.push((report, watched.seams(), again + rest.left_out));
+            before += std::mem::take(&mut size);
         }
+        Ok::<_, Error>((collector.finish()?, all))
+    };
+    let (mut recorded, mut all) = pass(&[], merged.as_ref().unwrap_or(&Copies::default()))?;
+    let mut seams: Vec<Vec<Seam>> = all.iter().map(|of| of.1.clone()).collect();
+    let is_pipe = inputs.iter().any(Input::is_pipe);
+    let (is_known, found) = match merged.take() {
+        Some(known) => (true, known),
+        None => (false, copies::merged(reading, &inputs, &recorded, &seams)?),
+    };
+    let merged = merged.insert(found);
+    // What is only in the recording that was appended to another begins no run.
+    for (bag, _) in merged.with_ids().filter(|(_, own)| !own.is_empty()) {
+        seams[bag].clear();
     }
-    let mut recorded = collector.finish()?;
+    let is_straight = seams.iter().all(Vec::is_empty);
+    if !is_pipe && (!is_straight || !is_known && !merged.is_empty()) {
+        (recorded, all) = pass(&seams, merged)?;
+    }
     let Some(whole) = known.or(recorded.span) else {
         return Err(no_messages(&reading.inputs, &recorded.notices));
     };
@@ -124,7 +130,8 @@ fn once(
     }
     recorded.notices.extend(twice);
     recorded.notices.extend(gap(&recorded, &inputs));
-    let left_out = left_out.iter().zip(&inputs).filter(|(many, _)| **many > 0);
+    let left_out = all.iter().map(|of| &of.2).zip(&inputs);
+    let left_out = left_out.filter(|(many, _)| **many > 0);
     recorded.notices.extend(left_out.map(twice_recorded));
     let falls = seams
         .iter()
@@ -148,7 +155,7 @@ fn once(
     }
     Ok(Collected {
         inputs,
-        reports,
+        reports: all.into_iter().map(|of| of.0).collect(),
         recorded,
         range,
     })

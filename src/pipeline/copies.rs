@@ -20,7 +20,8 @@ use crate::evidence::observation::Name;
 /// The time that is compared in large bags, whose payloads are not read, in nanoseconds: messages of slow topics are in it, too.
 const SAMPLE_NS: i64 = 10_000_000_000;
 
-/// The messages that are left out since another bag contains them: by bag and connection, the times that the other covers.
+/// The messages that are left out since another bag, or the same, contains them: by bag and connection, their times, sorted; an interval
+/// without length is the second message at its time.
 pub(super) type Copies = ById<usize, BTreeMap<ConnectionId, Vec<Span>>>;
 
 /// What a topic's messages in two bags have in common: its name, its publisher and its type.
@@ -46,6 +47,7 @@ pub(super) fn pairs(
     reading: &Reading,
     inputs: &[Input],
     recorded: &Recorded,
+    parts: &[Vec<usize>],
 ) -> Result<Vec<ClockOffset>> {
     let space = |bag: usize| space_of(reading, &inputs[bag]);
     let is_one = |pair: &&ClockOffset| pair.is_one_robot && space(pair.bag) == space(pair.other);
@@ -53,13 +55,10 @@ pub(super) fn pairs(
     let is_unread =
         |at: &usize| !recorded.streams[*at].latched && recorded.facts.payloads.some(*at).is_none();
     let mut common: BTreeSet<[usize; 2]> = BTreeSet::new();
-    let mut unread: BTreeSet<usize> = BTreeSet::new();
-    for bags in by_key(recorded).values().filter(|bags| bags.len() > 1) {
-        let own = bags.iter().filter(|(_, own)| own.iter().any(is_unread));
-        for (bag, _) in own {
+    for bags in by_key(recorded).values() {
+        for (bag, _) in bags.iter().filter(|(_, own)| own.iter().any(is_unread)) {
             let others = bags.keys().filter(|other| *other != bag);
             common.extend(others.map(|other| [*bag.min(other), *bag.max(other)]));
-            unread.insert(*bag);
         }
     }
     let is_known = |bags: &[usize; 2]| {
@@ -67,19 +66,21 @@ pub(super) fn pairs(
         pairs.iter().any(of) || bags.iter().any(|bag| inputs[*bag].is_pipe())
     };
     common.retain(|bags| !is_known(bags));
-    // A bag beside one whose payloads have been read is read whole, of two others the time that they share.
-    let is_small = affordable(reading).payload_bytes > 0;
-    let is_beside = |bags: &[usize; 2]| is_small && !bags.iter().all(|bag| unread.contains(bag));
-    let (beside, apart): (Vec<_>, Vec<_>) = common.into_iter().partition(is_beside);
-    let beside: BTreeSet<usize> = beside.into_iter().flatten().collect();
-    let spans = spans(recorded);
-    let shared = apart.into_iter().filter_map(|[one, other]| {
-        let (first, second) = (spans.some(one)?, spans.some(other)?);
-        let part = Span::new(first.start.max(second.start), first.end.min(second.end));
-        (part.nanos() > NEAR_NS).then(|| (vec![one, other], Some(part)))
-    });
-    let whole = (!beside.is_empty()).then(|| (beside.into_iter().collect(), None));
-    for (bags, part) in whole.into_iter().chain(shared) {
+    // Small bags are read whole, of large ones the time that two of them share.
+    let samples = if affordable(reading).payload_bytes > 0 {
+        let bags: BTreeSet<usize> = common.into_iter().flatten().collect();
+        vec![(bags.into_iter().collect(), None)]
+    } else {
+        let spans = spans(recorded);
+        let shared = |bags: [usize; 2]| {
+            let [one, other] = bags.map(|bag| spans.some(bag));
+            let (one, other) = one.zip(other)?;
+            let part = Span::new(one.start.max(other.start), one.end.min(other.end));
+            (part.nanos() > NEAR_NS).then(|| (bags.to_vec(), Some(part)))
+        };
+        common.into_iter().filter_map(shared).collect::<Vec<_>>()
+    };
+    for (bags, part) in samples {
         let inputs: Vec<&Input> = bags.iter().map(|bag| &inputs[*bag]).collect();
         let sample = sample(reading, &inputs, part)?;
         let found = sample.offsets.iter().filter(|pair| pair.is_one_robot);
@@ -89,8 +90,66 @@ pub(super) fn pairs(
             ..*pair
         }));
     }
-    pairs.sort_unstable_by_key(|pair| (pair.bag, pair.other));
-    Ok(pairs)
+    // The clock of a recorder is that of all parts into which it splits its recording; parts that have little in common may agree by chance.
+    let mut best: BTreeMap<[usize; 2], (usize, i64)> = BTreeMap::new();
+    let of = |bag: usize| {
+        parts
+            .iter()
+            .position(|bags| bags.contains(&bag))
+            .unwrap_or(0)
+    };
+    for pair in &pairs {
+        let (one, other) = (of(pair.bag), of(pair.other));
+        // Or of two recorders the one whose clock is so far ahead that its recording seems to be the next part.
+        if one == other {
+            pairs.sort_unstable_by_key(|pair| (pair.bag, pair.other));
+            return Ok(pairs);
+        }
+        for (key, ahead) in [([one, other], pair.ahead), ([other, one], -pair.ahead)] {
+            let known = best.entry(key).or_default();
+            *known = (*known).max((pair.messages, ahead));
+        }
+    }
+    let all = (0..inputs.len()).flat_map(|bag| (0..bag).map(move |other| [bag, other]));
+    let pair = |[bag, other]: [usize; 2]| {
+        let (messages, ahead) = *best.get(&[of(bag), of(other)])?;
+        Some(ClockOffset {
+            bag,
+            other,
+            ahead,
+            messages,
+            is_one_robot: true,
+        })
+    };
+    Ok(all.filter_map(pair).collect())
+}
+
+/// The messages that bags themselves contain twice, since recordings were merged; `seams`: where time goes back in each bag.
+pub(super) fn merged(
+    reading: &Reading,
+    inputs: &[Input],
+    recorded: &Recorded,
+    seams: &[Vec<Seam>],
+) -> Result<Copies> {
+    let mut copies = Copies::default();
+    let read = recorded.facts.payloads.somes();
+    let read: BTreeSet<usize> = read.map(|(at, _)| recorded.streams[at].bag).collect();
+    let all = inputs.iter().zip(seams).enumerate();
+    for (bag, (input, seams)) in all.filter(|(_, (input, _))| !input.is_pipe()) {
+        let sampled;
+        let (all, of) = if read.contains(&bag) || seams.is_empty() {
+            (recorded, bag)
+        } else {
+            sampled = sample(reading, &[input], None)?;
+            (&sampled, 0)
+        };
+        let again = clock::merged((&all.streams, &all.facts), of, seams.len());
+        for (at, span) in again.map_err(spool_error)? {
+            let of_bag = copies.grown(bag).entry(all.streams[at].connection.id);
+            of_bag.or_default().push(span);
+        }
+    }
+    Ok(copies)
 }
 
 /// The times that each bag covers.
@@ -147,6 +206,14 @@ pub(super) fn correct(
     (shifts, notices)
 }
 
+/// Moves the times of copies with the clocks of their bags.
+pub(super) fn moved(copies: &mut Copies, shifts: &ById<usize, i64>) {
+    for (bag, by) in shifts.with_ids() {
+        let spans = copies.grown(bag).values_mut().flatten();
+        spans.for_each(|span| *span = Span::new(span.start.plus(*by), span.end.plus(*by)));
+    }
+}
+
 /// The messages that are left out: of each topic those from the time of a bag that has more of them. What one recorder missed is
 /// not taken from another.
 pub(super) fn copies(
@@ -184,39 +251,20 @@ pub(super) fn copies(
             }
         }
     }
+    for spans in copies.iter_mut().flat_map(BTreeMap::values_mut) {
+        *spans = Span::joined(std::mem::take(spans), 0);
+    }
     copies
 }
 
-/// Finds out whether the run after a seam repeats the messages before it.
-pub(super) fn examine(
-    reading: &Reading,
-    input: &Input,
-    (recorded, bag): (&Recorded, usize),
-    seam: &mut Seam,
-) -> Result<()> {
-    let is_both = |s: &&Stream| {
-        let before = seam.count_before(s.connection.id);
-        s.bag == bag && before > 0 && recorded.messages.count(s.times) > before
-    };
-    let both = recorded.streams.iter().filter(is_both);
-    let both: BTreeSet<ConnectionId> = both.map(|s| s.connection.id).collect();
-    let span = Span::new(seam.after, seam.before.plus(1));
-    let repeats = |all: &Recorded, bag: usize| {
-        let is_both = |s: &Stream| s.bag == bag && both.contains(&s.connection.id);
-        clock::repeats((&all.streams, &all.facts), span, is_both).map_err(spool_error)
-    };
-    if repeats(recorded, bag)? || repeats(&sample(reading, &[input], Some(span))?, 0)? {
-        seam.repeated = both;
-    }
-    Ok(())
-}
-
-/// A sink that passes everything on but what another bag contains.
+/// A sink that passes everything on but what another bag, or the same, contains.
 pub(super) struct Rest<'a> {
     sink: &'a mut dyn Sink,
     copies: Option<&'a BTreeMap<ConnectionId, Vec<Span>>>,
     /// The number of messages that were left out.
     pub(super) left_out: u64,
+    /// The stamps and the messages that were passed on although the same connection has another one at their time, which is not.
+    passed: BTreeSet<(bool, ConnectionId, Stamp)>,
 }
 
 impl<'a> Rest<'a> {
@@ -225,13 +273,22 @@ impl<'a> Rest<'a> {
             sink,
             copies: copies.get(bag).filter(|own| !own.is_empty()),
             left_out: 0,
+            passed: BTreeSet::new(),
         }
     }
 
-    fn kept(&self, connection: ConnectionId, time: Stamp) -> Option<Stamp> {
-        let spans = self.copies.and_then(|all| all.get(&connection));
-        let is_copy = spans.is_some_and(|spans| spans.iter().any(|span| span.contains(time)));
-        (!is_copy).then_some(time)
+    fn keeps(&mut self, is_stamp: bool, connection: ConnectionId, time: Stamp) -> bool {
+        let Some(copies) = self.copies else {
+            return true;
+        };
+        let spans = copies.get(&connection).map_or(&[][..], Vec::as_slice);
+        let next = spans.partition_point(|span| span.start <= time);
+        match next.checked_sub(1).map(|at| spans[at]) {
+            Some(span) if span.nanos() == 0 && span.start == time => {
+                self.passed.insert((is_stamp, connection, time))
+            }
+            span => !span.is_some_and(|span| span.contains(time)),
+        }
     }
 }
 
@@ -242,16 +299,17 @@ impl Sink for Rest<'_> {
 
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
         if self.copies.is_none() {
-            self.sink.stamps(connection, stamps, sizes);
-            return;
+            return self.sink.stamps(connection, stamps, sizes);
         }
-        let kept = stamps.iter().map(|time| self.kept(connection, *time));
+        let kept = stamps
+            .iter()
+            .map(|time| Some(*time).filter(|time| self.keeps(true, connection, *time)));
         let kept: Vec<Option<Stamp>> = kept.collect();
-        self.left_out += pass(&mut *self.sink, connection, &kept, sizes);
+        self.left_out += pass(self.sink, connection, &kept, sizes);
     }
 
     fn message(&mut self, message: Message<'_>) {
-        if self.kept(message.connection, message.time).is_some() {
+        if self.keeps(false, message.connection, message.time) {
             self.sink.message(message);
         }
     }

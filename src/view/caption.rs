@@ -1,10 +1,9 @@
 //! The words of a window: its events as phrases for the headline, and the line below it.
 
 use std::cmp::Reverse;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::mem::discriminant;
 
-use super::choose::is_infrastructure;
 use super::items::Viewed;
 use super::state::LivingItems;
 use super::{Frame, Headline, ItemKind, OngoingEvent, Phrase};
@@ -47,16 +46,19 @@ pub(crate) struct CaptionWriter<'a> {
     shared: Vec<(Stamp, TopicId, [&'a str; 2])>,
 }
 
-/// The first moment at which two nodes send a topic that do not from the beginning, for long enough to be no hand-over. All
-/// nodes send to infrastructure.
+/// The first moment at which two nodes send a topic that do not from the beginning, for long enough to be no hand-over: one of which the
+/// log has a hand-over, since then one node at a time is meant to send it. Others, such as markers, have several senders as a matter of course.
 fn shared<'a>(mission: &'a Mission, viewed: &Viewed<'_>) -> Vec<(Stamp, TopicId, [&'a str; 2])> {
     let rates = Rates::new(mission);
     let begun = mission.span.start.plus(OVERLAP_NS);
     let mut all = Vec::new();
-    for (id, topic) in mission.elements.topics.with_ids() {
-        if is_infrastructure(topic.name.as_str()) || !viewed.sees(Element::Topic(id)) {
+    let events = mission.log.events.iter();
+    let handed = events.filter(|event| event.kind == Kind::HandedOver);
+    let handed: BTreeSet<Element> = handed.map(|event| event.what).collect();
+    for what in handed.into_iter().filter(|what| viewed.sees(*what)) {
+        let (_, Some(id)) = mission.elements.ends(what) else {
             continue;
-        }
+        };
         for pair in rates.holders(id).windows(2) {
             let times = pair[0]
                 .times

@@ -43,15 +43,7 @@ pub(super) const MOST_BYTES: usize = 200 << 20;
 const DEEPEST: usize = 40;
 
 /// Folders with built, fetched or hidden files.
-const SKIPPED: &[&str] = &[
-    "build",
-    "install",
-    "log",
-    "devel",
-    "node_modules",
-    "__pycache__",
-    "site-packages",
-];
+const SKIPPED: &str = "build install log devel node_modules __pycache__ site-packages";
 
 /// Files, and whether there were more than the limits allow.
 #[derive(Debug, Default)]
@@ -111,7 +103,9 @@ fn is_launch_name(folders: &str, name: &str) -> bool {
 
 /// Whether a folder is skipped.
 fn is_skipped(folder: &str) -> bool {
-    SKIPPED.contains(&folder) || folder.starts_with('.') || folder.contains("venv")
+    SKIPPED.split(' ').any(|skipped| skipped == folder)
+        || folder.starts_with('.')
+        || folder.contains("venv")
 }
 
 /// Whether a script without a file extension is in Python.

@@ -297,8 +297,7 @@ impl<'a> Evaluator<'a> {
 
     /// `map['key'] = value`
     fn put(&mut self, target: Node<'a>, value: PythonValue) {
-        let part = |name| target.child_by_field_name(name);
-        let (Some(map), Some(key)) = (part("value"), part("subscript")) else {
+        let Some([map, key]) = fields(target, ["value", "subscript"]) else {
             return;
         };
         let key = self.value(key).text();
@@ -317,11 +316,6 @@ impl<'a> Evaluator<'a> {
             .find_map(|f| f.names.get_mut(name))
     }
 
-    /// A copy of the value of a name.
-    fn named(&mut self, node: Node<'a>) -> PythonValue {
-        self.lookup(self.text(node), node)
-    }
-
     /// A copy of the value of a name at `node`.
     fn lookup(&mut self, name: &str, node: Node<'a>) -> PythonValue {
         let found = self.frames.iter().rev().find_map(|f| f.names.get(name));
@@ -335,11 +329,6 @@ impl<'a> Evaluator<'a> {
             None if name == "false" => Bool(false),
             None => unknown(node),
         }
-    }
-
-    /// A function of this file by its name.
-    fn function(&self, name: &str) -> Option<Node<'a>> {
-        self.functions.get(name).copied()
     }
 
     /// The return value of a function of this file.
@@ -400,7 +389,11 @@ impl<'a> Evaluator<'a> {
             "true" => Bool(true),
             "false" => Bool(false),
             "none" => PythonValue::None,
-            "identifier" => self.constant(node),
+            "identifier" => match self.text(node) {
+                "__file__" => Text("$(dirname)/launch.py".to_owned()),
+                "__name__" => Text("launch".to_owned()),
+                name => self.lookup(name, node),
+            },
             "parenthesized_expression" | "await" => {
                 node.named_child(0).map_or(unknown, |n| self.value(n))
             }
@@ -417,14 +410,6 @@ impl<'a> Evaluator<'a> {
             "attribute" => self.attribute(node),
             "call" => self.call_expression(node),
             _ => unknown,
-        }
-    }
-
-    fn constant(&mut self, node: Node<'a>) -> PythonValue {
-        match self.text(node) {
-            "__file__" => Text("$(dirname)/launch.py".to_owned()),
-            "__name__" => Text("launch".to_owned()),
-            _ => self.named(node),
         }
     }
 
@@ -579,14 +564,12 @@ impl<'a> Evaluator<'a> {
     }
 
     fn compared(&mut self, node: Node<'a>) -> Option<bool> {
-        let sides = children(node);
-        let [left, right] = sides[..] else {
+        let [left, right] = children(node)[..] else {
             return None;
         };
         let operator = node.child_by_field_name("operators")?;
-        let operator = self.text(operator);
         let (left, right) = (self.value(left), self.value(right));
-        match operator {
+        match self.text(operator) {
             "==" | "is" => left.equals(&right),
             "!=" | "is not" => left.equals(&right).map(|same| !same),
             "in" => left.is_in(&right),
@@ -603,8 +586,7 @@ impl<'a> Evaluator<'a> {
 
     /// `a if condition else b`
     fn choice(&mut self, node: Node<'a>) -> PythonValue {
-        let parts = children(node);
-        let [yes, condition, no] = parts[..] else {
+        let [yes, condition, no] = children(node)[..] else {
             return unknown(node);
         };
         match self.value(condition).truth() {
@@ -698,7 +680,7 @@ impl<'a> Evaluator<'a> {
         if let ("arg", Some(Text(argument))) = (full, arguments.positional.first()) {
             return self.lookup(argument, node);
         }
-        if let Some(own) = self.function(name) {
+        if let Some(own) = self.functions.get(name).copied() {
             return self.call(own, &arguments);
         }
         let value = self

@@ -367,10 +367,12 @@ fn compare(
     }
     let mut counted = BTreeSet::new();
     for (output, to) in group.iter().filter(|(_, to)| !all[*to].nodes.is_empty()) {
-        for (input, from) in group
-            .iter()
-            .filter(|(_, from)| is_other(&all[*from], &all[*to]))
-        {
+        // From different senders, as far as known.
+        let is_other = |(_, from): &&(_, usize)| {
+            let (one, other) = (&all[*from], &all[*to]);
+            one.topic != other.topic && (one.role.is_empty() || one.role != other.role)
+        };
+        for (input, from) in group.iter().filter(is_other) {
             if !counted.insert((from, to)) {
                 continue;
             }
@@ -383,11 +385,6 @@ fn compare(
             }
         }
     }
-}
-
-/// Whether two flows come from different senders, as far as known.
-fn is_other(one: &StampFlow, other: &StampFlow) -> bool {
-    one.topic != other.topic && (one.role.is_empty() || one.role != other.role)
 }
 
 #[cfg(test)]

@@ -208,13 +208,7 @@ pub(crate) fn read_ros2(context: &mut SourceContext<'_>, record: &LogRecord<'_>)
 }
 
 /// Parts of ROS 2 itself that log below the name of their node.
-const PARTS: [&str; 5] = [
-    "rclcpp",
-    "rcl",
-    "rclcpp_action",
-    "rclcpp_lifecycle",
-    "tf2_ros",
-];
+const PARTS: &str = "rclcpp rcl rclcpp_action rclcpp_lifecycle tf2_ros";
 
 /// A logger is a part of the nearest node or logger above it, and a node if there is none; the node publishes the log.
 pub(crate) fn conclude_ros2(source: SourceId, known: &mut Conclusions<'_>) {
@@ -268,7 +262,7 @@ fn owner<'a>(logger: &'a str, nodes: &BTreeSet<Arc<str>>) -> &'a str {
         above = &above[..above.rfind('/').unwrap_or(0)];
     }
     match logger.rsplit_once('/') {
-        Some((node, part)) if !node.is_empty() && PARTS.contains(&part) => node,
+        Some((node, part)) if !node.is_empty() && PARTS.split(' ').any(|own| own == part) => node,
         _ => generated(logger).unwrap_or(logger),
     }
 }

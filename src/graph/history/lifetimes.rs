@@ -211,11 +211,7 @@ impl Lifetime {
             from: sign,
             to: sign,
             sign,
-            began: Some(Bound {
-                time: sign,
-                earliest: gone,
-                latest: sign,
-            }),
+            began: Some(Bound::new(sign, gone, sign)),
             ended: None,
         }
     }
@@ -236,11 +232,7 @@ impl Lifetime {
     /// Ends the lifetime because of evidence.
     fn close(&mut self, end: Stamp) {
         let (last, end) = (self.to, end.max(self.to));
-        let ended = Bound {
-            time: end,
-            earliest: last,
-            latest: end,
-        };
+        let ended = Bound::new(end, last, end);
         self.end_at(end, Some(ended));
     }
 
@@ -632,11 +624,10 @@ impl Liveness {
     /// the last moment.
     fn end(&self, mission: Stamp, is_node: bool) -> Option<Bound> {
         if !self.lasts && !self.unending {
-            return self.signs.last().map(|last| Bound {
-                time: *last,
-                earliest: *last,
-                latest: mission,
-            });
+            return self
+                .signs
+                .last()
+                .map(|last| Bound::new(*last, *last, mission));
         }
         let last_sign = self.last_sign.filter(|_| !self.unending)?;
         let broken = self.pulses().iter().filter(|p| {
@@ -648,11 +639,11 @@ impl Liveness {
         let is_long = |p: &Pulse| p.silence(last_sign, mission) > GONE_NS;
         let is_sure = !is_node || broken.clone().any(is_long) || broken.clone().count() > 1;
         let fastest = broken.min_by_key(|p| p.period).filter(|_| is_sure)?;
-        Some(Bound {
-            time: last_sign,
-            earliest: fastest.last.min(last_sign),
-            latest: last_sign.plus(fastest.period.max(SHUTDOWN_NS)).min(mission),
-        })
+        Some(Bound::new(
+            last_sign,
+            fastest.last.min(last_sign),
+            last_sign.plus(fastest.period.max(SHUTDOWN_NS)).min(mission),
+        ))
     }
 
     /// Computes the lifetimes of an edge inside those of its node: a node that has advertised or subscribed

@@ -12,46 +12,59 @@ use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::observation::Name;
 use crate::graph::ById;
 
-/// The first and the last moment of the recording that each bag is a part of, by bag; `None` without messages. A bag is a part of
-/// another's recording if it precedes or follows it and has most topics in common with it.
-pub(crate) fn recordings(recorded: &Recorded, streams: &[Stream]) -> Vec<Option<(Stamp, Stamp)>> {
-    let mut spans: ById<usize, Option<(Stamp, Stamp)>> = ById::default();
-    let mut of_bags: ById<usize, BTreeSet<Name>> = ById::default();
-    for stream in streams {
-        let span = spans.grown(stream.bag);
-        if let Some((first, last)) = recorded.messages.bounds(stream.times) {
-            let all = span.get_or_insert((first, last));
-            *all = (all.0.min(first), all.1.max(last));
-            of_bags.grown(stream.bag).insert(stream.topic);
+/// The bags of each recording, in order: a bag continues the recording that ended just before it, if it has most topics in common with it.
+/// Of two recorders that split their recordings, each continues its own.
+pub(crate) fn parts(recorded: &Recorded) -> Vec<Vec<usize>> {
+    let mut bags: ById<usize, Option<((Stamp, Stamp), BTreeSet<Name>)>> = ById::default();
+    for stream in &recorded.streams {
+        if let Some((from, to)) = recorded.messages.bounds(stream.times) {
+            let (span, topics) = bags
+                .grown(stream.bag)
+                .get_or_insert(((from, to), BTreeSet::new()));
+            *span = (span.0.min(from), span.1.max(to));
+            topics.insert(stream.topic);
         }
     }
-    let is_part = |a: usize, b: usize| {
-        let (Some(one), Some(other)) = (spans[a], spans[b]) else {
-            return false;
+    let mut bags: Vec<_> = bags.somes().collect();
+    bags.sort_by_key(|(_, (span, _))| *span);
+    let mut all: Vec<(Stamp, BTreeSet<Name>, Vec<usize>)> = Vec::new();
+    for (bag, ((from, to), topics)) in bags {
+        let goes_on = |(end, others, _): &&mut (Stamp, BTreeSet<Name>, Vec<usize>)| {
+            let common = others.intersection(topics).count();
+            end.since(*from) <= OUT_OF_ORDER_NS && common * 2 > others.len().min(topics.len())
         };
-        let (topics, others) = (&of_bags[a], &of_bags[b]);
-        let shared = one.1.min(other.1).since(one.0.max(other.0));
-        let common = topics.intersection(others).count();
-        shared <= OUT_OF_ORDER_NS && common * 2 > topics.len().min(others.len())
-    };
-    let mut of: Vec<usize> = (0..spans.len()).collect();
-    for a in 0..spans.len() {
-        for b in 0..a {
-            if of[a] != of[b] && is_part(a, b) {
-                let (old, new) = (of[a], of[b]);
-                let own = of.iter_mut().filter(|one| **one == old);
-                own.for_each(|one| *one = new);
+        let before = all.iter_mut().filter(goes_on);
+        match before.min_by_key(|(end, ..)| from.since(*end).abs()) {
+            Some((end, others, bags)) => {
+                *end = *to.max(end);
+                others.extend(topics);
+                bags.push(bag);
             }
+            None => all.push((*to, topics.clone(), vec![bag])),
         }
     }
-    let mut whole: ById<usize, Option<(Stamp, Stamp)>> = ById::default();
-    for (span, one) in spans.iter().zip(&of) {
-        if let Some((from, to)) = *span {
-            let all = whole.grown(*one).get_or_insert((from, to));
-            *all = (all.0.min(from), all.1.max(to));
-        }
+    all.into_iter().map(|(.., bags)| bags).collect()
+}
+
+/// The first and the last moment of the recording that each bag is a part of, by bag; `None` without messages.
+pub(crate) fn recordings(recorded: &Recorded) -> ById<usize, Option<(Stamp, Stamp)>> {
+    let mut spans: ById<usize, Option<(Stamp, Stamp)>> = ById::default();
+    let found = parts(recorded);
+    let parts = if recorded.parts.is_empty() {
+        &found
+    } else {
+        &recorded.parts
+    };
+    for bags in parts {
+        let own = recorded
+            .streams
+            .iter()
+            .filter(|stream| bags.contains(&stream.bag));
+        let bounds = own.filter_map(|stream| recorded.messages.bounds(stream.times));
+        let span = bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        bags.iter().for_each(|bag| *spans.grown(*bag) = span);
     }
-    of.iter().map(|one| whole.some(*one).copied()).collect()
+    spans
 }
 
 /// The nodes that several recordings contain at the same time as publishers of one topic: of several robots,

@@ -303,7 +303,7 @@ impl Assembly<'_> {
     }
 
     fn node(&mut self, name: Name, liveness: &Liveness) {
-        let silent = self.node_silences(name, &spans(liveness));
+        let silent = self.silences(self.sent.of(name).iter().copied(), &spans(liveness));
         let all = &mut self.history;
         let text = self.findings.text(name);
         let id = all.elements.nodes.push(Node {
@@ -322,9 +322,11 @@ impl Assembly<'_> {
     }
 
     fn topic(&mut self, name: Name, liveness: &Liveness) {
-        let silent = self.topic_silences(name, &spans(liveness));
-        let unknown_publishers = self.unknown_publishers(name);
         let traffic = self.traffic.some(name);
+        let senders = traffic.iter().flat_map(|of| &of.list);
+        let senders = senders.filter(|sender| !sender.latched);
+        let silent = self.silences(senders, &spans(liveness));
+        let unknown_publishers = self.unknown_publishers(name);
         let streams = traffic.iter().flat_map(|of| &of.streams);
         let values = &self.findings.values;
         let mut types: Vec<_> = streams
@@ -387,18 +389,6 @@ impl Assembly<'_> {
             topic: *self.history.topic_ids.some(topic)?,
             seen: seen(liveness),
         })
-    }
-
-    /// The times at which all senders of a topic are silent.
-    fn topic_silences(&self, topic: Name, lives: &[Span]) -> Vec<Silence> {
-        let all = self.traffic.some(topic).into_iter().flat_map(|of| &of.list);
-        self.silences(all.filter(|sender| !sender.latched), lives)
-    }
-
-    /// The times at which a node is silent on all its topics.
-    fn node_silences(&self, node: Name, lives: &[Span]) -> Vec<Silence> {
-        let of = self.sent.of(node).iter().copied();
-        self.silences(of, lives)
     }
 
     /// The times at which some senders are silent, as far as their recordings reach and were not paused.

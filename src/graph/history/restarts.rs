@@ -252,7 +252,8 @@ pub(crate) fn restarts(
     for (node, own) in nodes.with_ids() {
         let is_copy = |fall: &&Fall| {
             let mut alike = alike.get(&fall.header()).into_iter().flatten();
-            alike.any(|(other, of)| *other != node && fall.is_later_than(of))
+            // A throttle drops messages, and the recorder may receive the copy first.
+            alike.any(|(other, of)| *other != node && (of.before, fall.to) > (fall.before, of.to))
         };
         let own_falls = falls.of(node).iter().filter(|fall| !is_copy(fall));
         let mut breaks: Vec<_> = own_falls.map(|fall| (fall.from, fall.to)).collect();
@@ -315,12 +316,6 @@ impl Fall {
     /// whose numbers say nothing about the forwarding node.
     fn header(&self) -> (u64, u32, &str) {
         (self.first.stamp, self.first.number, &self.kind)
-    }
-
-    /// Whether it is the copy, of two with one header. A throttle drops messages, and the recorder may
-    /// receive the copy first.
-    fn is_later_than(&self, other: &Self) -> bool {
-        (other.before, self.to) > (self.before, other.to)
     }
 }
 

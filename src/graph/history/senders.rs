@@ -78,7 +78,7 @@ pub(crate) fn sender(stream: &Stream) -> Option<Name> {
 
 /// Reads the times of every topic once.
 pub(crate) fn traffic(recorded: &Recorded, findings: &Findings) -> Result<Traffic> {
-    let recordings = recordings(recorded, &findings.streams);
+    let recordings = recordings(recorded);
     let mut streams: ById<Name, Vec<usize>> = ById::default();
     for (at, stream) in findings.streams.iter().enumerate() {
         streams.grown(stream.topic).push(at);
@@ -96,7 +96,7 @@ pub(crate) fn traffic(recorded: &Recorded, findings: &Findings) -> Result<Traffi
 fn senders(
     recorded: &Recorded,
     findings: &Findings,
-    recordings: &[Option<(Stamp, Stamp)>],
+    recordings: &ById<usize, Option<(Stamp, Stamp)>>,
     streams: Vec<usize>,
 ) -> io::Result<Senders> {
     let of_topic: Vec<&Stream> = streams.iter().map(|at| &findings.streams[*at]).collect();
@@ -187,7 +187,7 @@ const LATCHED: u64 = 20;
 fn places(
     recorded: &Recorded,
     streams: &[&Stream],
-    recordings: &[Option<(Stamp, Stamp)>],
+    recordings: &ById<usize, Option<(Stamp, Stamp)>>,
 ) -> (Vec<usize>, Vec<SenderTimes>) {
     let mut nodes: Vec<Option<Name>> = streams.iter().map(|stream| sender(stream)).collect();
     nodes.sort_unstable();
@@ -195,7 +195,7 @@ fn places(
     let place = |stream: &&Stream| nodes.binary_search(&sender(stream)).unwrap_or(0);
     let received = nodes.iter().map(|node| {
         let own = || streams.iter().filter(|stream| sender(stream) == *node);
-        let reached = own().filter_map(|stream| recordings[stream.bag]);
+        let reached = own().filter_map(|stream| recordings.some(stream.bag).copied());
         let reached = reached.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         SenderTimes {
             node: *node,

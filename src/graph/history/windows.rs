@@ -36,11 +36,7 @@ fn lives(what: Element, graphs: &Graphs) -> Vec<Life> {
         let from = run.first()?.0;
         let to = run.get(1).map_or(spans.len(), |(at, _)| *at);
         let (first, last) = (spans.get(from)?, spans.get(to.checked_sub(1)?)?);
-        let bound = |time, window: &Span| Bound {
-            time,
-            earliest: window.start,
-            latest: window.end,
-        };
+        let bound = |time, window: &Span| Bound::new(time, window.start, window.end);
         Some(Life {
             span: Span::new(first.start, last.end),
             began: (from > 0).then(|| bound(first.start, first)),

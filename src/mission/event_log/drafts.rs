@@ -135,9 +135,5 @@ impl<'a> LogInput<'a> {
 
 /// An exact time.
 pub(super) fn exact(time: Stamp) -> Bound {
-    Bound {
-        time,
-        earliest: time,
-        latest: time,
-    }
+    Bound::new(time, time, time)
 }

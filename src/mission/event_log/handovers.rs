@@ -133,11 +133,7 @@ fn hand_over(
     topic: TopicId,
     [(old, last), (new, first)]: [(NodeId, Stamp); 2],
 ) {
-    let at = Bound {
-        time: first,
-        earliest: last.min(first),
-        latest: last.max(first),
-    };
+    let at = Bound::new(first, last.min(first), last.max(first));
     let mut event = context.event(Kind::HandedOver, Element::Topic(topic), at);
     event.detail = Detail::Senders {
         from: vec![old],

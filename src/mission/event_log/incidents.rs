@@ -51,14 +51,19 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     }
 }
 
-/// Adds the changes of nodes' lifecycle states.
+/// Adds the changes of nodes' lifecycle states. A node that starts again has none of its earlier states.
 pub(super) fn add_lifecycles(context: &LogInput<'_>, drafts: &mut Drafts) {
-    let mut states: BTreeMap<NodeId, Arc<str>> = BTreeMap::new();
+    let mut states: BTreeMap<(NodeId, Option<usize>), Arc<str>> = BTreeMap::new();
+    let is_of_windows = context.history.sending.pauses.is_empty();
     for change in &context.history.transitions {
-        let before = states.insert(change.node, change.state.clone());
+        let what = Element::Node(change.node);
+        let mut lives = context.lives(what).iter();
+        let life = lives.position(|life| life.span.contains(change.time));
+        let before = states.insert((change.node, life), change.state.clone());
+        // The first window of a node shows its state, and no change.
+        let is_first = before.is_none() && is_of_windows;
         let (from, to) = (before.unwrap_or_default(), change.state.clone());
-        if from != to {
-            let what = Element::Node(change.node);
+        if from != to && !is_first {
             drafts.add(Event {
                 confidence: Confidence::Stated,
                 evidence: Evidence::of("lifecycle"),

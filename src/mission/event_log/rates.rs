@@ -34,11 +34,11 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
             }
             // Stray messages are not uncertain: the rate begins with its first message.
             let last = none.map_or(before.last, |_| after.first);
-            let at = Bound {
-                time: after.first,
-                earliest: last.min(after.first.plus(-before.period)),
-                latest: after.first.plus(after.period),
-            };
+            let at = Bound::new(
+                after.first,
+                last.min(after.first.plus(-before.period)),
+                after.first.plus(after.period),
+            );
             let mut event = context.event(Kind::Rate, context.publication(sender), at);
             event.detail = Detail::Rates {
                 from_hz,

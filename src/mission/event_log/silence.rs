@@ -31,7 +31,9 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
         for silence in silences(context, Element::Topic(topic)) {
             let mut event = event(context, Element::Topic(topic), *silence, &senders);
             let nodes = senders.iter().filter_map(|v| of_nodes.get(&v.node?));
-            let whole = nodes.flatten().find(|(of, _)| meet(*of, *silence));
+            let is_before = |a: Silence, b: Silence| a.1.is_some_and(|end| end <= b.0);
+            let meets = |of| !is_before(of, *silence) && !is_before(*silence, of);
+            let whole = nodes.flatten().find(|(of, _)| meets(*of));
             let whole = whole.map(|(_, id)| *id);
             event.part_of = whole.or_else(|| gone.at(&senders, silence.0));
             drafts.add(event);
@@ -86,19 +88,9 @@ fn event(
     let stretches = senders.iter().flat_map(|v| &v.stretches);
     let last = stretches.filter(|s| s.last == from);
     let period = last.map(|s| s.period).max().unwrap_or(0);
-    let at = Bound {
-        time: from,
-        earliest: from,
-        latest: from.plus(period),
-    };
+    let at = Bound::new(from, from, from.plus(period));
     super::Event {
         until: to,
         ..context.event(Kind::Silent, what, at)
     }
-}
-
-/// Whether two silences overlap.
-fn meet(a: Silence, b: Silence) -> bool {
-    let before = |a: Silence, b: Silence| a.1.is_some_and(|end| end <= b.0);
-    !before(a, b) && !before(b, a)
 }

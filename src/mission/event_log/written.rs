@@ -87,7 +87,7 @@ pub(crate) fn whole(rows: &str, format: LogFormat, is_of_folder: bool) -> String
     match format {
         LogFormat::Csv => {
             let bag = if is_of_folder { "bag," } else { "" };
-            format!("{bag}{}\n{rows}", COLUMNS.join(","))
+            format!("{bag}{COLUMNS}\n{rows}")
         }
         LogFormat::Json => {
             let rows = rows.lines().collect::<Vec<_>>().join(",\n");
@@ -306,24 +306,9 @@ fn escaped(text: &str) -> String {
     all
 }
 
-const COLUMNS: [&str; 16] = [
-    "time_ns",
-    "kind",
-    "what",
-    "name",
-    "topic",
-    "id",
-    "earliest_ns",
-    "latest_ns",
-    "until_ns",
-    "before",
-    "after",
-    "degree",
-    "evidence",
-    "part_of",
-    "quiet",
-    "weight",
-];
+const COLUMNS: &str = "\
+    time_ns,kind,what,name,topic,id,earliest_ns,latest_ns,until_ns,before,after,degree,evidence,part_of,quiet,\
+    weight";
 
 /// What is not about an element, as a row.
 #[derive(Serialize)]
@@ -374,7 +359,7 @@ fn csv(mission: &Mission, bag: Option<&str>, rows: &[LogRow<'_>]) -> String {
     let rows = rows.iter().map(|row| match row {
         LogRow::Event(id, event) | LogRow::Part(id, event) => cells(mission, *id, event),
         other => other.period().map_or_else(Vec::new, |one| {
-            let mut cells = vec![String::new(); COLUMNS.len()];
+            let mut cells = vec![String::new(); COLUMNS.split(',').count()];
             cells[0] = one.time_ns.0.to_string();
             one.kind.clone_into(&mut cells[1]);
             cells[3] = visible(one.name.unwrap_or_default()).into_owned();

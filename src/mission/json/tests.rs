@@ -7,6 +7,7 @@ use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::Evidence;
 use crate::graph::graphs_for_tests::graph;
 use crate::graph::{Edge, Elements, Existence, Graph, Node, NodeId, Topic, TopicId};
+use crate::mission::event_log::{Detail, Kind};
 use crate::mission::{EventLog, Mission, Sending, Window, read_json, write_json};
 
 fn elements() -> Elements {
@@ -97,6 +98,20 @@ proptest! {
         prop_assert_eq!(&first, &second);
         prop_assert_eq!(written(&first), written(&second));
     }
+}
+
+#[test]
+fn the_first_lifecycle_state_of_a_node_in_windows_is_no_change() {
+    let text = r#"{"schema": "bagreel.mission/3", "windows": [{"start_ns": 0, "end_ns": 5}, {"start_ns": 5, "end_ns": 9},
+        {"start_ns": 9, "end_ns": 12}, {"start_ns": 12, "end_ns": 20}, {"start_ns": 20, "end_ns": 29}], "elements": [
+        {"what": "node", "name": "/a", "in": {"windows": [[0, 1], [3, 4]], "state": [["active", 4]],
+        "lifecycle": ["inactive", "active", "inactive", "inactive"]}}]}"#;
+    let mission = read(text);
+    let changes = mission.log.events.iter();
+    let changes = changes.filter(|event| event.kind == Kind::Lifecycle);
+    let changes: Vec<_> = changes.map(|event| (event.time.0, &event.detail)).collect();
+    let (from, to) = ("inactive".into(), "active".into());
+    assert_eq!(changes, [(5, &Detail::Values { from, to })]);
 }
 
 #[test]

@@ -5,22 +5,10 @@ use super::PythonValue::{self, Action, Dict, Function, List, Text, Unknown};
 use super::{Arguments, Evaluator, UNREAD};
 
 /// Actions that start no node and change no name.
-const OTHER: &[&str] = &[
-    "AppendEnvironmentVariable",
-    "EmitEvent",
-    "ExecuteLocal",
-    "ExecuteProcess",
-    "LogInfo",
-    "ResetEnvironment",
-    "SetEnvironmentVariable",
-    "SetParameter",
-    "SetParametersFromFile",
-    "SetROSLogDir",
-    "SetUseSimTime",
-    "Shutdown",
-    "UnsetEnvironmentVariable",
-    "UnsetLaunchConfiguration",
-];
+const OTHER: &str = "\
+    AppendEnvironmentVariable EmitEvent ExecuteLocal ExecuteProcess LogInfo ResetEnvironment \
+    SetEnvironmentVariable SetParameter SetParametersFromFile SetROSLogDir SetUseSimTime Shutdown \
+    UnsetEnvironmentVariable UnsetLaunchConfiguration";
 
 impl Evaluator<'_> {
     /// The action that a call creates, if any.
@@ -55,7 +43,7 @@ impl Evaluator<'_> {
     /// are unknown.
     fn opaque(&mut self, arguments: &Arguments) -> Tree {
         let function = match arguments.get(0, "function") {
-            Some(Function(name)) => self.function(name),
+            Some(Function(name)) => self.functions.get(name).copied(),
             _ => None,
         };
         let Some(function) = function else {
@@ -119,7 +107,7 @@ fn tree(name: &str, given: &Arguments) -> Option<Tree> {
             let condition = format!("$(eval '$(var {variable})' {sign} '{value}')");
             element("condition", &[("if", Some(condition))])
         }
-        other if OTHER.contains(&other) => element("other", &[]),
+        other if OTHER.split(' ').any(|name| name == other) => element("other", &[]),
         _ => return None,
     };
     match name {
