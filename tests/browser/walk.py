@@ -37,7 +37,8 @@ def walk(b, name, wide):
     assert sentence and "None" not in sentence and is_quiet == (not rows), (name, sentence, len(rows))
     counts = re.findall(r"(\d+) (?:change|interruption)s?\b", sentence.split(". ")[0])
     listed = [row for row in rows if " is back " not in row[3]]
-    assert sum(map(int, counts)) == len(listed), (name, sentence, len(listed))
+    # A longer list is cut, and says so.
+    assert sum(map(int, counts)) == len(listed) or len(rows) == 200, (name, sentence, len(listed))
     b.keys(HOME)
     last, visited = b.js(SEEK), 0
     while visited < MOST:
