@@ -510,6 +510,17 @@ fn rows_of_a_truncated_database_are_read() {
 }
 
 #[test]
+fn a_table_that_is_empty_unlike_its_index_is_damaged() {
+    let (name, mut bytes) = tiny::bags().pop().unwrap();
+    // A page of rows, and their number in two bytes.
+    let page = [0x0d, 0, 0, 0, u8::try_from(MESSAGES).unwrap()];
+    let at = bytes.windows(5).rposition(|w| w == page).unwrap();
+    bytes[at + 4] = 0;
+    let (report, kept) = read_bytes(name, &bytes);
+    assert_eq!((kept.stamps.len(), report.complete), (0, false));
+}
+
+#[test]
 fn table_names_are_case_insensitive() {
     let recording = short();
     let dir = tempfile::tempdir().unwrap();

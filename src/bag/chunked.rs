@@ -10,6 +10,7 @@ mod growing;
 mod index;
 mod plan;
 mod record;
+mod search;
 mod unpack;
 
 use std::collections::BTreeSet;

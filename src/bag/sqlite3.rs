@@ -320,6 +320,10 @@ impl Sqlite3Bag {
     }
 }
 
+/// Whether the table of messages is empty, but not the index of their times: its first page is damaged.
+const LOST: &str = "SELECT (SELECT rowid FROM messages NOT INDEXED LIMIT 1) IS NULL \
+                    AND (SELECT timestamp FROM messages ORDER BY timestamp LIMIT 1) IS NOT NULL";
+
 /// Has SQLite check the whole file for damage, and the index of times against the rows.
 fn check(db: &Db, sink: &mut dyn Sink) {
     let found = db.first("PRAGMA integrity_check(1)", &[], |row| row.text(0));
@@ -349,9 +353,14 @@ impl Reader for Sqlite3Bag {
         }
         self.notices.iter().for_each(|n| clip.notice(n.clone()));
         let db = Db::open(&self.ready).map_err(|e| broken(&self.path, &e))?;
+        let mut tier = Tier::Index;
         if self.verify {
             check(&db, &mut clip);
+            tier = Tier::Verify;
         }
+        let is_lost = matches!(db.first(LOST, &[], |row| row.integer(0)), Ok(Some(1)));
+        let text = "the table of messages has no rows, but the index of their times does";
+        damaged(&mut clip, u64::from(is_lost), text);
         let rows = RowReader::new(self, &wants, range);
         let parts = self.parts(&db, range);
         drop(db);
@@ -365,11 +374,7 @@ impl Reader for Sqlite3Bag {
             name: file_name(&self.path),
             format: FORMAT.name.to_owned(),
             compression: vec![if self.packed { "zstd" } else { "none" }.to_owned()],
-            tier: if self.verify {
-                Tier::Verify
-            } else {
-                Tier::Index
-            },
+            tier,
             tier_reason: None,
             complete: !clip.lost,
             bytes_read: 0,

@@ -288,8 +288,8 @@ def main():
     args.add_argument("--sizes", default=SIZES)
     args.add_argument("--rounds", type=int, default=3)
     args.add_argument("--only", action="append", choices=COMMANDS)
-    args.add_argument("kinds", nargs="*", choices=[*KINDS, []])
-    args = args.parse_args()
+    args.add_argument("kinds", nargs="*", metavar="KIND")
+    args = args.parse_intermixed_args()
     sizes = [int(size) for size in args.sizes.split(",")]
     # `check` needs the file of `baseline`, and `diff` that of `json`.
     commands = {name: words for name, words in COMMANDS.items() if name in (args.only or COMMANDS)}

@@ -126,7 +126,8 @@ fn a_changed_bag_loses_nothing_silently_as_a_file_or_through_a_pipe() {
 #[test]
 #[ignore = "minutes; by hand after changes to a reader"]
 fn many_changed_bags_lose_nothing_silently_as_a_file_or_through_a_pipe() {
-    agree(2000);
+    let rounds = std::env::var("ROUNDS").ok();
+    agree(rounds.map_or(2000, |rounds| rounds.parse().unwrap()));
 }
 
 #[test]

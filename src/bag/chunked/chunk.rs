@@ -3,10 +3,10 @@
 use std::io;
 
 use super::Grammar;
-use super::forward::next_chunk;
 use super::index::{ChunkBody, Index, IndexSum, LONGEST_INDEX, Query, hand_over, nameless, spans};
 use super::plan::Chunk;
 use super::record::{NoRecord, RecordHead};
+use super::search::next_chunk;
 use super::unpack::{Visitor, unpack};
 use crate::bag::adapters::Gather;
 use crate::bag::model::{Sink, Want, damaged, lost};

@@ -4,8 +4,8 @@ use std::io::Read;
 use std::sync::Arc;
 
 use super::Grammar;
-use super::forward::next_record;
 use super::record::{ChunkHead, NoRecord, RecordHead, pass, walk};
+use super::search::next_record;
 use crate::bag::checksum::CrcReader;
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::source::ByteStream;

@@ -86,10 +86,10 @@ fn records(
                 start,
                 end,
                 count,
-            } if u64::from(count) * PAIR == len => {
+            } if u64::from(count) * PAIR as u64 == len => {
                 found.1 += 1;
                 let number = |pair: &[u8], at| records::u32_at(pair, at);
-                let pairs = peek_whole(stream, len)?.chunks_exact(PAIR as usize);
+                let pairs = peek_whole(stream, len)?.chunks_exact(PAIR);
                 let counts = pairs.filter_map(|pair| number(pair, 0).zip(number(pair, 4)));
                 tail.list((pos, 0..0), (start, end), Some(counts.collect()))?;
             }
@@ -110,7 +110,7 @@ fn records(
 }
 
 /// The number of bytes of a connection's number and that of its messages in a chunk.
-const PAIR: u64 = 8;
+const PAIR: usize = 8;
 
 /// Sorts the chunks and sets the end of each.
 fn into_plan(mut tail: Tail<Rosbag1>) -> Result<ChunkPlan, Unindexed> {
