@@ -312,7 +312,7 @@ fn offset(
     let is_set = near.clone().all(|lag| lag.2[1]);
     let topics: BTreeSet<&str> = near.map(|lag| lag.1).collect();
     let is_clear = messages >= FEWEST && messages * 100 >= lags.len() * SHARE;
-    (is_clear && (is_stamped || topics.len() >= TOPICS)).then(|| ClockOffset {
+    (is_clear && (is_stamped || topics.len() >= TOPICS)).then_some(ClockOffset {
         bag,
         other,
         ahead,
