@@ -220,14 +220,14 @@ struct Contents<'a> {
     messages: Vec<(u32, Stamp, usize)>,
 }
 
-/// The messages of some streams, without latched ones.
+/// The messages of some streams.
 fn contents<'a>(
     streams: &'a [Stream],
     facts: &Observations,
     is_in: impl Fn(&Stream) -> bool,
 ) -> io::Result<Vec<Contents<'a>>> {
     let all = facts.payloads.somes();
-    let all = all.filter(|(at, _)| !streams[*at].latched && is_in(&streams[*at]));
+    let all = all.filter(|(at, _)| is_in(&streams[*at]));
     let all = grouped(all.map(|(at, own)| {
         let of = &streams[at].connection;
         let publisher = of.publisher.as_ref().map(NodeName::as_str);
@@ -261,7 +261,7 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
         return Ok(Vec::new());
     }
     let mut lags: BTreeMap<[usize; 2], Vec<Lag<'_>>> = BTreeMap::new();
-    for of in contents(streams, facts, |_| true)? {
+    for of in contents(streams, facts, |stream| !stream.latched)? {
         for same in of.messages.chunk_by(|a, b| a.0 == b.0) {
             // What a bag contains more often is a constant.
             let mut times: BTreeMap<usize, Option<Stamp>> = BTreeMap::new();
@@ -312,7 +312,7 @@ fn offset(
     let is_set = near.clone().all(|lag| lag.2[1]);
     let topics: BTreeSet<&str> = near.map(|lag| lag.1).collect();
     let is_clear = messages >= FEWEST && messages * 100 >= lags.len() * SHARE;
-    (is_clear && (is_stamped || topics.len() >= TOPICS)).then(|| ClockOffset {
+    (is_clear && (is_stamped || topics.len() >= TOPICS)).then_some(ClockOffset {
         bag,
         other,
         ahead,

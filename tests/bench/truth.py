@@ -70,6 +70,12 @@ def situations(messages, folder):
                 latched[connection.id] = (round(first + late * SECOND), connection, data)
         return sorted([*latched.values(), *kept], key=lambda message: message[0])
 
+    def parts(recording, many):
+        """The files into which a recorder splits its recording."""
+        first, last = recording[0][0], recording[-1][0]
+        cuts = [*(first + (last - first) * at // many for at in range(many)), last + 1]
+        return [[one for one in recording if a <= one[0] < b] for a, b in zip(cuts, cuts[1:])]
+
     half, most = set(topics[::2]), dict(since=0.02, until=0.9)
     zero = start - 100 * SECOND
     simulated = [(time - zero, of, data) for time, of, data in part(**most, of=half)]
@@ -82,6 +88,13 @@ def situations(messages, folder):
         "the same, its clock an hour ahead": [messages, part(**most, ahead=3600, of=half)],
         "the same, in simulated time": [messages, simulated],
         "the same, appended to one file": [messages + part(**most, of=half)],
+        "the same, merged and sorted in one file": [
+            sorted(messages + part(**most, of=half), key=lambda message: message[0])
+        ],
+        "two recorders in parts, one ends sooner, the other 3.3 s ahead": [
+            *parts(part(until=0.85), 3),
+            *parts(part(since=0.1, ahead=3.3, of=half), 4),
+        ],
         "two recorders, one after the other": [part(until=0.6), part(since=0.4, ahead=1.5)],
         "three recorders, of a third of the topics and half of another": [
             part(of=set(topics[at::3]) | set(topics[(at + 1) % 3 :: 6]) | {"/rosout", "/rosout_agg"})

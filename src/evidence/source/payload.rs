@@ -41,11 +41,8 @@ const RECENT_NS: i64 = 2_000_000_000;
 /// The number of bytes of a payload that are compared: a header's stamp and the first lines of an image are among them.
 pub(crate) const HEAD: usize = 16 << 10;
 
-/// Keeps the hash of a payload of `size` bytes with this beginning. An empty one is not evidence.
+/// Keeps the hash of a payload of `size` bytes with this beginning.
 pub(crate) fn collect(context: &mut SourceContext<'_>, beginning: &[u8], size: u32) {
-    if beginning.is_empty() {
-        return;
-    }
     // A fixed seed, so that two contents that share a hash by chance share it in every run.
     let hash = FixedState::default().hash_one((size, beginning));
     let [a, b, c, d, ..] = hash.to_le_bytes();

@@ -12,10 +12,13 @@ use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::observation::Name;
 use crate::graph::ById;
 
+/// The first and the last moment of a bag, and its topics.
+type Part = ((Stamp, Stamp), BTreeSet<Name>);
+
 /// The bags of each recording, in order: a bag continues the recording that ended just before it, if it has most topics in common with it.
 /// Of two recorders that split their recordings, each continues its own.
 pub(crate) fn parts(recorded: &Recorded) -> Vec<Vec<usize>> {
-    let mut bags: ById<usize, Option<((Stamp, Stamp), BTreeSet<Name>)>> = ById::default();
+    let mut bags: ById<usize, Option<Part>> = ById::default();
     for stream in &recorded.streams {
         if let Some((from, to)) = recorded.messages.bounds(stream.times) {
             let (span, topics) = bags
@@ -62,7 +65,9 @@ pub(crate) fn recordings(recorded: &Recorded) -> ById<usize, Option<(Stamp, Stam
             .filter(|stream| bags.contains(&stream.bag));
         let bounds = own.filter_map(|stream| recorded.messages.bounds(stream.times));
         let span = bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-        bags.iter().for_each(|bag| *spans.grown(*bag) = span);
+        for bag in bags {
+            *spans.grown(*bag) = span;
+        }
     }
     spans
 }
