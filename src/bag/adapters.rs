@@ -46,10 +46,8 @@ impl Sink for Clip<'_> {
         if stamps.iter().all(|t| range.contains(*t)) {
             return self.sink.stamps(connection, stamps, sizes);
         }
-        let inside = stamps
-            .iter()
-            .map(|at| Some(*at).filter(|at| range.contains(*at)));
-        let inside: Vec<Option<Stamp>> = inside.collect();
+        let inside = |at: &Stamp| Some(*at).filter(|at| range.contains(*at));
+        let inside: Vec<Option<Stamp>> = stamps.iter().map(inside).collect();
         pass(self.sink, connection, &inside, sizes);
     }
 

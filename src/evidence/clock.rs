@@ -238,7 +238,8 @@ fn contents<'a>(
         let mut messages = Vec::new();
         let add = |timed: Timed| messages.push((timed.size, timed.time, of[timed.series]));
         facts.times.merge(&series, add)?;
-        messages.sort_unstable();
+        // Those of one content stay in order of time.
+        messages.sort_by_key(|message| message.0);
         let stamped = of.iter().any(|at| facts.ages.some(*at).is_some());
         Ok(Contents {
             topic,
@@ -269,9 +270,8 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
                 let own = times.entry(streams[*at].bag).or_insert(Some(*time));
                 *own = own.filter(|own| own == time);
             }
-            let times = times
-                .into_iter()
-                .filter_map(|(bag, time)| Some((bag, time?)));
+            let times = times.into_iter();
+            let times = times.filter_map(|(bag, time)| Some((bag, time?)));
             let times: Vec<(usize, Stamp)> = times.collect();
             for (at, (bag, time)) in times.iter().enumerate() {
                 for (other, before) in &times[..at] {
@@ -293,9 +293,8 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
         all.any(|(name, _)| started.contains(&(name, other)))
     };
     let all = lags.into_iter();
-    Ok(all
-        .filter_map(|(bags, lags)| offset(bags, lags, is_one_run(bags)))
-        .collect())
+    let found = all.filter_map(|(bags, lags)| offset(bags, lags, is_one_run(bags)));
+    Ok(found.collect())
 }
 
 /// The common messages of two bags with these times between them; `None` without agreement.
@@ -357,11 +356,9 @@ pub(crate) fn merged(
     });
     let is_merged = if seams > 0 {
         // Two runs of a simulation may have equal messages at equal times.
-        let times = topics.iter().flat_map(|(of, ..)| &of.messages);
-        usual <= NEAR_NS
-            && times
-                .min_by_key(|of| of.1)
-                .is_some_and(|of| of.1.0 > UNSET_DAYS * DAY)
+        let messages = topics.iter().flat_map(|(of, ..)| &of.messages);
+        let first = messages.map(|message| message.1).min();
+        usual <= NEAR_NS && first.is_some_and(|at| at.0 > UNSET_DAYS * DAY)
     } else {
         let is_some = topics.len() > TOPICS && topics.len() * 4 >= many_topics;
         is_some && usual <= MERGED_NS
@@ -372,30 +369,24 @@ pub(crate) fn merged(
     // The messages of a fast topic may be constant.
     let mut late: Vec<i64> = lags.iter().map(|lag| (lag - usual).abs()).collect();
     late.sort_unstable();
-    let near = late[late.len() * 9 / 10]
-        .saturating_mul(3)
-        .clamp(NEAR_NS / 50, NEAR_NS);
+    let near = late[late.len() * 9 / 10].saturating_mul(3);
+    let near = near.clamp(NEAR_NS / 50, NEAR_NS);
+    let contents = all.iter();
+    let contents = contents.flat_map(|of| of.messages.chunk_by(|a, b| a.0 == b.0));
     let mut again = Vec::new();
-    for same in all
-        .iter()
-        .flat_map(|of| of.messages.chunk_by(|a, b| a.0 == b.0))
-    {
+    for same in contents {
         // Those before that none repeats yet.
         let mut first: VecDeque<Stamp> = VecDeque::new();
         for (_, time, at) in same.iter().copied() {
-            while first
-                .front()
-                .is_some_and(|first| time.since(*first) > usual + near)
-            {
+            let is_gone = |first: &Stamp| time.since(*first) > usual + near;
+            while first.front().is_some_and(is_gone) {
                 first.pop_front();
             }
-            match first
-                .front()
-                .filter(|first| time.since(**first) >= usual - near)
-            {
+            let before = first.front().copied();
+            match before.filter(|before| time.since(*before) >= usual - near) {
                 Some(before) => {
                     // Of two messages at one time, one stays.
-                    again.push((at, Span::new(time, time.plus(i64::from(*before < time)))));
+                    again.push((at, Span::new(time, time.plus(i64::from(before < time)))));
                     first.pop_front();
                 }
                 None => first.push_back(time),

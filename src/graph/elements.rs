@@ -99,17 +99,21 @@ impl Topic {
     /// Whether many nodes publish to topics of its type in turn, so that a new publisher is not a takeover.
     pub(crate) fn is_shared(&self) -> bool {
         let mut types = self.types.iter();
-        types.any(|kind| {
-            SHARED
-                .split(' ')
-                .any(|shared| kind.rsplit('/').next() == Some(shared))
-        })
+        types.any(|kind| SHARED.contains(&kind.rsplit('/').next().unwrap_or(kind)))
     }
 }
 
 /// Types of topics that many nodes publish to in turn.
-const SHARED: &str =
-    "Log ParameterEvent TFMessage DiagnosticArray Status Clock tfMessage TopicStatistics";
+const SHARED: [&str; 8] = [
+    "Log",
+    "ParameterEvent",
+    "TFMessage",
+    "DiagnosticArray",
+    "Status",
+    "Clock",
+    "tfMessage",
+    "TopicStatistics",
+];
 
 /// A publication or a subscription, over the whole mission.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -92,14 +92,14 @@ pub(super) fn pairs(
     }
     // The clock of a recorder is that of all parts into which it splits its recording; parts that have little in common may agree by chance.
     let mut best: BTreeMap<[usize; 2], (usize, i64)> = BTreeMap::new();
-    let of = |bag: usize| {
-        parts
-            .iter()
-            .position(|bags| bags.contains(&bag))
-            .unwrap_or(0)
-    };
+    let mut part = vec![0; inputs.len()];
+    for (at, bags) in parts.iter().enumerate() {
+        for bag in bags {
+            part[*bag] = at;
+        }
+    }
     for pair in &pairs {
-        let (one, other) = (of(pair.bag), of(pair.other));
+        let (one, other) = (part[pair.bag], part[pair.other]);
         // Or of two recorders the one whose clock is so far ahead that its recording seems to be the next part.
         if one == other {
             pairs.sort_unstable_by_key(|pair| (pair.bag, pair.other));
@@ -110,9 +110,10 @@ pub(super) fn pairs(
             *known = (*known).max((pair.messages, ahead));
         }
     }
-    let all = (0..inputs.len()).flat_map(|bag| (0..bag).map(move |other| [bag, other]));
+    let bags = (0..inputs.len()).filter(|_| !best.is_empty());
+    let all = bags.flat_map(|bag| (0..bag).map(move |other| [bag, other]));
     let pair = |[bag, other]: [usize; 2]| {
-        let (messages, ahead) = *best.get(&[of(bag), of(other)])?;
+        let (messages, ahead) = *best.get(&[part[bag], part[other]])?;
         Some(ClockOffset {
             bag,
             other,
@@ -301,10 +302,8 @@ impl Sink for Rest<'_> {
         if self.copies.is_none() {
             return self.sink.stamps(connection, stamps, sizes);
         }
-        let kept = stamps
-            .iter()
-            .map(|time| Some(*time).filter(|time| self.keeps(true, connection, *time)));
-        let kept: Vec<Option<Stamp>> = kept.collect();
+        let keep = |time: &Stamp| Some(*time).filter(|time| self.keeps(true, connection, *time));
+        let kept: Vec<Option<Stamp>> = stamps.iter().map(keep).collect();
         self.left_out += pass(self.sink, connection, &kept, sizes);
     }
 

@@ -492,12 +492,10 @@ impl Early {
     /// Takes an index record of the last chunk, which replaces the messages found in it if it has more; returns how many more.
     fn index(&mut self, raw: u32, count: u32, stamps: &[Stamp]) -> u64 {
         let count = count as usize;
-        let run = self.runs.get_mut(&raw);
-        let found = run.map_or(0, |run| {
-            let stated = run.last.min(count);
-            run.last -= stated;
-            stated
-        });
+        let mut none = EarlyRun::default();
+        let run = self.runs.get_mut(&raw).unwrap_or(&mut none);
+        let found = run.last.min(count);
+        run.last -= found;
         if count > found && stamps.len() == count && self.held < MOST_EARLY {
             self.held += count;
             let run = self.runs.entry(raw).or_default();

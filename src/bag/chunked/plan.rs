@@ -198,9 +198,8 @@ impl<G: Grammar> Tail<G> {
     /// may describe the others.
     pub(crate) fn is_described(&self) -> Result<(), Unindexed> {
         let small = (0..).zip(&self.used.small).filter(|(_, used)| **used);
-        let mut all = small
-            .map(|(raw, _)| raw)
-            .chain(self.used.large.iter().copied());
+        let small = small.map(|(raw, _)| raw);
+        let mut all = small.chain(self.used.large.iter().copied());
         if all.all(|raw| self.plan.connections.get(raw).is_some()) {
             return Ok(());
         }

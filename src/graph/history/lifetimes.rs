@@ -624,10 +624,8 @@ impl Liveness {
     /// the last moment.
     fn end(&self, mission: Stamp, is_node: bool) -> Option<Bound> {
         if !self.lasts && !self.unending {
-            return self
-                .signs
-                .last()
-                .map(|last| Bound::new(*last, *last, mission));
+            let last = self.signs.last();
+            return last.map(|last| Bound::new(*last, *last, mission));
         }
         let last_sign = self.last_sign.filter(|_| !self.unending)?;
         let broken = self.pulses().iter().filter(|p| {

@@ -21,9 +21,8 @@ pub(crate) fn parts(recorded: &Recorded) -> Vec<Vec<usize>> {
     let mut bags: ById<usize, Option<Part>> = ById::default();
     for stream in &recorded.streams {
         if let Some((from, to)) = recorded.messages.bounds(stream.times) {
-            let (span, topics) = bags
-                .grown(stream.bag)
-                .get_or_insert(((from, to), BTreeSet::new()));
+            let part = bags.grown(stream.bag);
+            let (span, topics) = part.get_or_insert(((from, to), BTreeSet::new()));
             *span = (span.0.min(from), span.1.max(to));
             topics.insert(stream.topic);
         }
@@ -49,22 +48,27 @@ pub(crate) fn parts(recorded: &Recorded) -> Vec<Vec<usize>> {
     all.into_iter().map(|(.., bags)| bags).collect()
 }
 
+/// The first and the last of several moments.
+fn hull(bounds: impl IntoIterator<Item = Option<(Stamp, Stamp)>>) -> Option<(Stamp, Stamp)> {
+    let bounds = bounds.into_iter().flatten();
+    bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+}
+
 /// The first and the last moment of the recording that each bag is a part of, by bag; `None` without messages.
 pub(crate) fn recordings(recorded: &Recorded) -> ById<usize, Option<(Stamp, Stamp)>> {
     let mut spans: ById<usize, Option<(Stamp, Stamp)>> = ById::default();
     let found = parts(recorded);
-    let parts = if recorded.parts.is_empty() {
-        &found
-    } else {
-        &recorded.parts
-    };
+    let is_known = !recorded.parts.is_empty();
+    let parts = if is_known { &recorded.parts } else { &found };
+    for stream in &recorded.streams {
+        let both = [
+            *spans.grown(stream.bag),
+            recorded.messages.bounds(stream.times),
+        ];
+        *spans.grown(stream.bag) = hull(both);
+    }
     for bags in parts {
-        let own = recorded
-            .streams
-            .iter()
-            .filter(|stream| bags.contains(&stream.bag));
-        let bounds = own.filter_map(|stream| recorded.messages.bounds(stream.times));
-        let span = bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let span = hull(bags.iter().map(|bag| spans.some(*bag).copied()));
         for bag in bags {
             *spans.grown(*bag) = span;
         }

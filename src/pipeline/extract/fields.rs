@@ -44,6 +44,7 @@ pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted>
         folder: Folder::create(job.target.path())?,
         format: job.format,
         all: Vec::new(),
+        of_topic: BTreeMap::new(),
         names: BTreeSet::from([INDEX.to_owned()]),
         waiting: 0,
         failed: None,
@@ -91,10 +92,8 @@ fn nothing(job: &Extract, lost: &Lost) -> Error {
     if lost.types.is_empty() {
         return Error::no_messages(&name, "`bagreel info` lists its topics and times");
     }
-    let types = lost
-        .types
-        .iter()
-        .map(|(name, why)| format!("{name}: {why}"));
+    let types = lost.types.iter();
+    let types = types.map(|(name, why)| format!("{name}: {why}"));
     let types = words::some_of(&types.collect::<Vec<String>>(), MOST_NAMED);
     let what = format!("no message could be decoded; {types}");
     let hint = "`--msg-path DIR` names a folder of `.msg`, `.srv`, `.action` or `.idl` files";
@@ -148,6 +147,8 @@ struct FieldTables {
     folder: Folder,
     format: TableFormat,
     all: Vec<FieldTable>,
+    /// The tables of each topic.
+    of_topic: BTreeMap<String, Vec<usize>>,
     /// The file names in use, in lower case: some file systems are case-insensitive.
     names: BTreeSet<String>,
     waiting: usize,
@@ -157,11 +158,13 @@ struct FieldTables {
 impl FieldTables {
     /// The index of the table for such messages.
     fn of(&mut self, topic: &str, type_name: &str, decoder: Decoder) -> usize {
-        let same =
-            |t: &FieldTable| t.topic == topic && t.type_name == type_name && t.decoder == decoder;
-        if let Some(at) = self.all.iter().position(same) {
+        let own = self.of_topic.entry(topic.to_owned()).or_default();
+        let all = own.iter().map(|at| (*at, &self.all[*at]));
+        let mut same = all.filter(|(_, t)| t.type_name == type_name && t.decoder == decoder);
+        if let Some((at, _)) = same.next() {
             return at;
         }
+        own.push(self.all.len());
         let columns = [
             TableColumn::full(TIME, ColumnKind::Time, 0),
             TableColumn::known(PUBLISHER, ColumnKind::Text),
@@ -185,11 +188,8 @@ impl FieldTables {
         let table = &mut self.all[at];
         table.batch.columns[0].push(&TableCell::Time(message.time));
         table.batch.columns[1].push(&TableCell::known(publisher, TableCell::text));
-        if table
-            .decoder
-            .decode(message.data, &mut table.batch, 2)
-            .is_err()
-        {
+        let decoded = table.decoder.decode(message.data, &mut table.batch, 2);
+        if decoded.is_err() {
             table.batch.take_back();
             return false;
         }
