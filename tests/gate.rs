@@ -662,7 +662,9 @@ fn two_runs_a_day_apart_are_not_one_mission() {
             code == 0 && first.is_some_and(|line| line.contains("`bagreel diff`")),
             "{said}"
         );
+        assert!(said.contains(", recordings far apart: "), "{said}");
         let (_, said) = run(here, &[command, "day.bag", "soon.bag"]);
-        assert!(!said.contains("longer than the recordings"), "{said}");
+        let is_one = !said.contains("longer than the recordings") && !said.contains("far apart");
+        assert!(is_one, "{said}");
     }
 }

@@ -231,11 +231,8 @@ pub(super) fn events(args: &EventsArgs, given: &Given, terminal: &mut Terminal) 
             terminal.note(NO_EVENTS);
         }
     }
-    wrote(
-        logs.outputs.iter().map(|(target, _)| target),
-        "the event log",
-        terminal,
-    );
+    let targets = logs.outputs.iter().map(|(target, _)| target);
+    wrote(targets, "the event log", terminal);
     terminal.notices(&logs.notices);
     Ok(if logs.notices.any_loss() {
         SKIPPED
@@ -261,10 +258,8 @@ pub(super) fn info_of(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -
     let hint = "write `x.txt`, `x.json`, `x.csv` or `x.parquet`";
     let of = |word: &str| InfoFormat::from_str(word, false).ok();
     let outputs = outputs((&args.outputs, args.format), of, hint, &reading)?;
-    if outputs
-        .iter()
-        .any(|(_, format)| *format == InfoFormat::Parquet)
-    {
+    let mut formats = outputs.iter().map(|(_, format)| *format);
+    if formats.any(|format| format == InfoFormat::Parquet) {
         TableFormat::Parquet.built()?;
     }
     let folder = folder(&args.inputs, &reading);

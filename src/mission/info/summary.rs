@@ -7,6 +7,7 @@ use super::{Info, TopicInfo};
 use crate::base::cast;
 use crate::base::ids::grouped;
 use crate::base::name::{is_quiet, last_part, namespace};
+use crate::base::notice::NoticeKind;
 use crate::base::rhythm::CLOSE_NS;
 use crate::base::words::{self, visible};
 use crate::graph::Element;
@@ -72,7 +73,8 @@ pub(crate) fn summary(mission: &Mission, info: &Info) -> String {
         none if none.is_empty() => at_times(mission) + "nothing changed",
         some => some,
     };
-    let first = format!("{}, {many}", contents(info));
+    let is_apart = mission.notices.iter().any(|n| n.kind == NoticeKind::Apart);
+    let first = format!("{}, {many}", contents(info, is_apart));
     if moments.is_empty() {
         return first;
     }
@@ -93,8 +95,8 @@ fn at_times(mission: &Mission) -> String {
     }
 }
 
-/// The length, the nodes and the topics with messages; the rate if there is only one.
-fn contents(info: &Info) -> String {
+/// The length, with recordings of several runs as such, the nodes and the topics with messages; the rate if there is only one.
+fn contents(info: &Info, is_apart: bool) -> String {
     let topics: Vec<&TopicInfo> = info.topics.iter().filter(|t| t.count > 0).collect();
     let counts = [
         (info.nodes_by_degree.total(), "node"),
@@ -106,7 +108,10 @@ fn contents(info: &Info) -> String {
         _ => None,
     };
     let length = words::duration(cast::to_i64(info.duration_s * 1e9));
-    format!("{length}: {counts}{}", rate.unwrap_or_default())
+    let apart = is_apart
+        .then_some(", recordings far apart")
+        .unwrap_or_default();
+    format!("{length}{apart}: {counts}{}", rate.unwrap_or_default())
 }
 
 fn weight(headlines: &[Headline<'_>]) -> u32 {
