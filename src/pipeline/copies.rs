@@ -80,7 +80,7 @@ pub(super) fn pairs(
         };
         common.into_iter().filter_map(shared).collect::<Vec<_>>()
     };
-    for (bags, part) in samples {
+    for (bags, part) in samples.into_iter().filter(|(bags, _)| !bags.is_empty()) {
         let inputs: Vec<&Input> = bags.iter().map(|bag| &inputs[*bag]).collect();
         let sample = sample(reading, &inputs, part)?;
         let found = sample.offsets.iter().filter(|pair| pair.is_one_robot);
