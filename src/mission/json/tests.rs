@@ -106,7 +106,8 @@ fn the_first_lifecycle_state_of_a_node_in_windows_is_no_change() {
         {"start_ns": 9, "end_ns": 12}, {"start_ns": 12, "end_ns": 20}, {"start_ns": 20, "end_ns": 29}], "elements": [
         {"what": "node", "name": "/a", "in": {"windows": [[0, 1], [3, 4]], "state": [["active", 4]],
         "lifecycle": ["inactive", "active", "inactive", "inactive"]}}]}"#;
-    let mission = read(text);
+    let mut mission = read(text);
+    mission.find_changes(0.25);
     let changes = mission.log.events.iter();
     let changes = changes.filter(|event| event.kind == Kind::Lifecycle);
     let changes: Vec<_> = changes.map(|event| (event.time.0, &event.detail)).collect();
