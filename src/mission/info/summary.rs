@@ -108,9 +108,8 @@ fn contents(info: &Info, is_apart: bool) -> String {
         _ => None,
     };
     let length = words::duration(cast::to_i64(info.duration_s * 1e9));
-    let apart = is_apart
-        .then_some(", recordings far apart")
-        .unwrap_or_default();
+    let apart = Some(", recordings far apart").filter(|_| is_apart);
+    let apart = apart.unwrap_or_default();
     format!("{length}{apart}: {counts}{}", rate.unwrap_or_default())
 }
 
