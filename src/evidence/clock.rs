@@ -220,20 +220,22 @@ struct Contents<'a> {
     messages: Vec<(u32, Stamp, usize)>,
 }
 
-/// The messages of some streams.
+/// The messages of some streams, those of the topics with the fewest first.
 fn contents<'a>(
     streams: &'a [Stream],
-    facts: &Observations,
-    is_in: impl Fn(&Stream) -> bool,
-) -> io::Result<Vec<Contents<'a>>> {
-    let all = facts.payloads.somes();
-    let all = all.filter(|(at, _)| is_in(&streams[*at]));
+    facts: &'a Observations,
+    of: impl Iterator<Item = usize>,
+) -> impl ExactSizeIterator<Item = io::Result<Contents<'a>>> {
+    let all = of.filter_map(|at| Some((at, *facts.payloads.some(at)?)));
     let all = grouped(all.map(|(at, own)| {
         let of = &streams[at].connection;
         let publisher = of.publisher.as_ref().map(NodeName::as_str);
-        ((of.topic.as_str(), publisher), (at, *own))
+        ((of.topic.as_str(), publisher), (at, own))
     }));
-    let topics = all.into_iter().map(|((topic, _), own)| {
+    let many = |own: &[(usize, _)]| own.iter().map(|of| facts.times.count(of.1)).sum::<u64>();
+    let mut all: Vec<_> = all.into_iter().collect();
+    all.sort_by_cached_key(|(_, own)| many(own));
+    all.into_iter().map(|((topic, _), own)| {
         let (of, series): (Vec<usize>, Vec<_>) = own.into_iter().unzip();
         let mut messages = Vec::new();
         let add = |timed: Timed| messages.push((timed.size, timed.time, of[timed.series]));
@@ -246,8 +248,7 @@ fn contents<'a>(
             stamped,
             messages,
         })
-    });
-    topics.collect()
+    })
 }
 
 /// The nanoseconds between a message in two bags, its topic, and whether it carries a stamp and is in wall time.
@@ -262,7 +263,9 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
         return Ok(Vec::new());
     }
     let mut lags: BTreeMap<[usize; 2], Vec<Lag<'_>>> = BTreeMap::new();
-    for of in contents(streams, facts, |stream| !stream.latched)? {
+    let of = (0..streams.len()).filter(|at| !streams[*at].latched);
+    for of in contents(streams, facts, of) {
+        let of = of?;
         for same in of.messages.chunk_by(|a, b| a.0 == b.0) {
             // What a bag contains more often is a constant.
             let mut times: BTreeMap<usize, Option<Stamp>> = BTreeMap::new();
@@ -320,43 +323,47 @@ fn offset(
     })
 }
 
-/// The messages of a bag that repeat others, by stream and time, each as an interval, since the recordings of two recorders were merged:
-/// on more than two topics, and a quarter of all, most contents that are not constant occur twice, with one difference of time. If a
-/// script appended one recording to another, time goes back in the file (`seams` times), and it is enough that messages of one topic were
-/// recorded again at once.
+/// The messages of a bag that repeat others, by stream and time, each as an interval, since the recordings of two recorders were
+/// merged: on more than two topics, and a quarter of all, most contents that are not constant occur twice, with one difference of
+/// time. If a script appended one recording to another, time goes back in the file (`seams` times), and it is enough that messages of
+/// one topic were recorded again at once. `of`: the bag's streams.
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
 pub(crate) fn merged(
     (streams, facts): (&[Stream], &Observations),
-    bag: usize,
+    of: &[usize],
     seams: usize,
 ) -> io::Result<Vec<(usize, Span)>> {
-    let all = contents(streams, facts, |stream| stream.bag == bag)?;
-    let topics = all.iter().map(|of| {
+    let mut rest = contents(streams, facts, of.iter().copied());
+    let (mut all, mut topics, mut many_topics) = (Vec::new(), Vec::new(), 0);
+    while let Some(of) = rest.next().transpose()? {
         let (mut many, mut lags) = (0, Vec::new());
         let same = of.messages.chunk_by(|a, b| a.0 == b.0);
         for same in same.filter(|same| same.len() <= (seams + 1).max(2)) {
             many += 1;
             lags.extend(same.windows(2).map(|two| two[1].1.since(two[0].1)));
         }
-        (of, many, lags)
-    });
-    let mut topics: Vec<_> = topics.filter(|(_, many, _)| *many >= FEWEST).collect();
-    let many_topics = topics.len();
-    topics.retain(|(_, many, lags)| lags.len() >= FEWEST && lags.len() * 4 >= *many);
-    let mut lags: Vec<i64> = topics.iter().flat_map(|(.., lags)| lags).copied().collect();
+        many_topics += usize::from(many >= FEWEST);
+        if many >= FEWEST && lags.len() >= FEWEST && lags.len() * 4 >= many {
+            topics.push((all.len(), lags));
+        }
+        all.push(of);
+        // If too few topics occur twice even with all that are left, those with most messages need not be read.
+        if seams == 0 && topics.len() * 4 + rest.len() * 3 < many_topics {
+            return Ok(Vec::new());
+        }
+    }
+    let mut lags: Vec<i64> = topics.iter().flat_map(|(_, lags)| lags).copied().collect();
     lags.sort_unstable();
-    let Some(usual) = lags.get(lags.len() / 2).copied() else {
-        return Ok(Vec::new());
-    };
-    topics.retain(|(.., lags)| {
+    let usual = lags.get(lags.len() / 2).copied().unwrap_or(i64::MAX);
+    topics.retain(|(_, lags)| {
         let near = lags.iter().filter(|lag| (**lag - usual).abs() <= NEAR_NS);
         near.count() * 100 >= lags.len() * SHARE
     });
     let is_merged = if seams > 0 {
         // Two runs of a simulation may have equal messages at equal times.
-        let messages = topics.iter().flat_map(|(of, ..)| &of.messages);
+        let messages = topics.iter().flat_map(|(at, _)| &all[*at].messages);
         let first = messages.map(|message| message.1).min();
         usual <= NEAR_NS && first.is_some_and(|at| at.0 > UNSET_DAYS * DAY)
     } else {

@@ -46,6 +46,7 @@ pub struct Bound {
 }
 
 impl Bound {
+    /// A time between an earliest and a latest one.
     pub(crate) fn new(time: Stamp, earliest: Stamp, latest: Stamp) -> Self {
         Self {
             time,

@@ -23,8 +23,8 @@ pub(super) struct Collected {
     pub(super) range: Span,
 }
 
-/// Reads every bag once, and again if several recorded one robot or two recordings of it were merged; with `verify` by the second, independent reader. Adds the offsets
-/// of clocks that it finds to the reading.
+/// Reads every bag once, and again if several recorded one robot or two recordings of it were merged; with `verify` by the second,
+/// independent reader. Adds the offsets of clocks that it finds to the reading.
 pub(super) fn collect(
     reading: &mut Reading,
     verify: bool,

@@ -133,18 +133,20 @@ pub(super) fn merged(
     seams: &[Vec<Seam>],
 ) -> Result<Copies> {
     let mut copies = Copies::default();
-    let read = recorded.facts.payloads.somes();
-    let read: BTreeSet<usize> = read.map(|(at, _)| recorded.streams[at].bag).collect();
+    let mut read: ById<usize, Vec<usize>> = ById::default();
+    for (at, _) in recorded.facts.payloads.somes() {
+        read.grown(recorded.streams[at].bag).push(at);
+    }
     let all = inputs.iter().zip(seams).enumerate();
     for (bag, (input, seams)) in all.filter(|(_, (input, _))| !input.is_pipe()) {
         let sampled;
-        let (all, of) = if read.contains(&bag) || seams.is_empty() {
-            (recorded, bag)
+        let (all, of) = if seams.is_empty() || !read.of(bag).is_empty() {
+            (recorded, read.of(bag).to_vec())
         } else {
             sampled = sample(reading, &[input], None)?;
-            (&sampled, 0)
+            (&sampled, (0..sampled.streams.len()).collect())
         };
-        let again = clock::merged((&all.streams, &all.facts), of, seams.len());
+        let again = clock::merged((&all.streams, &all.facts), &of, seams.len());
         for (at, span) in again.map_err(spool_error)? {
             let of_bag = copies.grown(bag).entry(all.streams[at].connection.id);
             of_bag.or_default().push(span);

@@ -22,7 +22,7 @@ use crate::base::time::Stamp;
 struct Early {
     runs: BTreeMap<u32, EarlyRun>,
     held: usize,
-    /// The connections of those of the last chunk that no index record has yet.
+    /// The connections of those of the last chunk, in order.
     last: Vec<u32>,
 }
 

@@ -42,9 +42,6 @@ pub(super) const MOST_BYTES: usize = 200 << 20;
 /// The deepest nesting of folders that is entered, as folders may be mounted in circles: workspaces nest a dozen deep.
 const DEEPEST: usize = 40;
 
-/// Folders with built, fetched or hidden files.
-const SKIPPED: &str = "build install log devel node_modules __pycache__ site-packages";
-
 /// Files, and whether there were more than the limits allow.
 #[derive(Debug, Default)]
 pub(super) struct Files {
@@ -101,11 +98,13 @@ fn is_launch_name(folders: &str, name: &str) -> bool {
         || name.split('.').next_back() == Some("xml") && folders.split('/').any(|f| f == "launch")
 }
 
-/// Whether a folder is skipped.
+/// Whether a folder is skipped: with built, fetched or hidden files.
 fn is_skipped(folder: &str) -> bool {
-    SKIPPED.split(' ').any(|skipped| skipped == folder)
-        || folder.starts_with('.')
-        || folder.contains("venv")
+    let is_built = matches!(
+        folder,
+        "build" | "install" | "log" | "devel" | "node_modules" | "__pycache__" | "site-packages"
+    );
+    is_built || folder.starts_with('.') || folder.contains("venv")
 }
 
 /// Whether a script without a file extension is in Python.

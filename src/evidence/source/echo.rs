@@ -358,10 +358,8 @@ fn form(text: &str) -> String {
 /// Whether most of the texts come before their messages; `None` if not nearly all texts and messages come together.
 fn beside_of(texts: &[Stamp], times: &[Stamp]) -> Option<bool> {
     let are_most = |both: usize| {
-        let shares = [texts, times].into_iter().zip(SHARES_BESIDE);
-        shares
-            .clone()
-            .all(|(all, share)| both * 100 >= all.len() * share)
+        let mut shares = [texts, times].into_iter().zip(SHARES_BESIDE);
+        shares.all(|(all, share)| both * 100 >= all.len() * share)
     };
     if !are_most(texts.len().min(times.len())) {
         return None;

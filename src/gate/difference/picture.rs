@@ -107,11 +107,8 @@ fn side_of(mission: &Mission) -> MissionSide {
         };
         side.insert(Key::Topic(name), topic);
     }
-    let nodes: BTreeSet<Key> = side
-        .keys()
-        .filter(|k| matches!(k, Key::Node(_)))
-        .cloned()
-        .collect();
+    let nodes = side.keys().filter(|key| matches!(key, Key::Node(_)));
+    let nodes: BTreeSet<Key> = nodes.cloned().collect();
     side.retain(|key, _| match key {
         Key::Publish(node, _) | Key::Subscribe(_, node) => nodes.contains(&Key::Node(node.clone())),
         Key::Node(_) | Key::Topic(_) => true,

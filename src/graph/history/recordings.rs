@@ -15,9 +15,8 @@ use crate::graph::ById;
 /// The first and the last moment of a bag, and its topics.
 type Part = ((Stamp, Stamp), BTreeSet<Name>);
 
-/// The bags of each recording, in order: a bag continues the recording that ended just before it, if it has most topics in common with it.
-/// Of two recorders that split their recordings, each continues its own.
-pub(crate) fn parts(recorded: &Recorded) -> Vec<Vec<usize>> {
+/// Each bag with messages.
+fn bags(recorded: &Recorded) -> ById<usize, Option<Part>> {
     let mut bags: ById<usize, Option<Part>> = ById::default();
     for stream in &recorded.streams {
         if let Some((from, to)) = recorded.messages.bounds(stream.times) {
@@ -27,6 +26,13 @@ pub(crate) fn parts(recorded: &Recorded) -> Vec<Vec<usize>> {
             topics.insert(stream.topic);
         }
     }
+    bags
+}
+
+/// The bags of each recording, in order: a bag continues the recording that ended just before it, if it has most topics in common with it.
+/// Of two recorders that split their recordings, each continues its own.
+pub(crate) fn parts(recorded: &Recorded) -> Vec<Vec<usize>> {
+    let bags = bags(recorded);
     let mut bags: Vec<_> = bags.somes().collect();
     bags.sort_by_key(|(_, (span, _))| *span);
     let mut all: Vec<(Stamp, BTreeSet<Name>, Vec<usize>)> = Vec::new();
@@ -48,28 +54,15 @@ pub(crate) fn parts(recorded: &Recorded) -> Vec<Vec<usize>> {
     all.into_iter().map(|(.., bags)| bags).collect()
 }
 
-/// The first and the last of several moments.
-fn hull(bounds: impl IntoIterator<Item = Option<(Stamp, Stamp)>>) -> Option<(Stamp, Stamp)> {
-    let bounds = bounds.into_iter().flatten();
-    bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
-}
-
 /// The first and the last moment of the recording that each bag is a part of, by bag; `None` without messages.
 pub(crate) fn recordings(recorded: &Recorded) -> ById<usize, Option<(Stamp, Stamp)>> {
     let mut spans: ById<usize, Option<(Stamp, Stamp)>> = ById::default();
-    let found = parts(recorded);
-    let is_known = !recorded.parts.is_empty();
-    let parts = if is_known { &recorded.parts } else { &found };
-    for stream in &recorded.streams {
-        let both = [
-            *spans.grown(stream.bag),
-            recorded.messages.bounds(stream.times),
-        ];
-        *spans.grown(stream.bag) = hull(both);
-    }
-    for bags in parts {
-        let span = hull(bags.iter().map(|bag| spans.some(*bag).copied()));
-        for bag in bags {
+    let found = recorded.parts.is_empty().then(|| parts(recorded));
+    let bags = bags(recorded);
+    for part in found.as_ref().unwrap_or(&recorded.parts) {
+        let own = part.iter().filter_map(|bag| Some(bags.some(*bag)?.0));
+        let span = own.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        for bag in part {
             *spans.grown(*bag) = span;
         }
     }
