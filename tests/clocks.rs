@@ -342,8 +342,7 @@ fn two_robots_with_the_same_names_are_distinguished_by_a_namespace() {
             kind.word()
         );
     }
-    let says = |text: &str| both.notices.iter().any(|n| n.text.contains(text));
-    assert!(!says("restarts are unknown"));
+    assert!(!says(&both, "restarts are unknown"));
 }
 
 #[test]
@@ -378,6 +377,11 @@ fn the_offset_of_a_clock_is_estimated_from_common_messages() {
     );
 }
 
+/// Whether a notice of a mission contains this text.
+fn says(mission: &Mission, text: &str) -> bool {
+    mission.notices.iter().any(|n| n.text.contains(text))
+}
+
 /// The headlines of a mission, each with its time in seconds, sorted.
 fn headlines(mission: &Mission) -> Vec<(Kind, String, i64)> {
     let all = mission.log.headlines(mission.span).map(|(_, event)| {
@@ -408,9 +412,8 @@ fn recordings_that_were_merged_and_sorted_count_once() {
         let mut both = healthy.appended(again);
         both.messages.sort_by_key(|message| message.1);
         let merged = mission(&[both], |_, _| {});
-        let says = |text: &str| merged.notices.iter().any(|n| n.text.contains(text));
         assert!(
-            says("messages of `0.bag`, recorded twice"),
+            says(&merged, "messages of `0.bag`, recorded twice"),
             "{:?}",
             merged.notices
         );
@@ -427,12 +430,7 @@ fn recordings_that_were_merged_and_sorted_count_once() {
         }
     }
     let camera = mission(&[bag], |_, _| {});
-    assert!(
-        !camera
-            .notices
-            .iter()
-            .any(|n| n.text.contains("recorded twice"))
-    );
+    assert!(!says(&camera, "recorded twice"));
 }
 
 #[test]
@@ -478,9 +476,8 @@ fn two_recorders_in_simulated_time_are_of_one_run_if_a_node_started_once() {
     };
     let alone = mission(&[simulated(0)], |_, _| {});
     let both = mission(&[simulated(0), simulated(healthy.length / 3)], |_, _| {});
-    let says = |text: &str| both.notices.iter().any(|n| n.text.contains(text));
     assert!(
-        says("messages of `1.bag`, recorded twice"),
+        says(&both, "messages of `1.bag`, recorded twice"),
         "{:?}",
         both.notices
     );
@@ -528,9 +525,9 @@ fn what_two_recorders_recorded_counts_once() {
         .find(|s| s.topic.0 as usize == pose);
     let counts: Vec<u64> = sender.unwrap().stretches.iter().map(|s| s.count).collect();
     assert_eq!(counts, [600]);
-    let says = |text: &str| mission.notices.iter().any(|n| n.text.contains(text));
     assert!(
-        says("left out 300 messages of `1.bag`, recorded twice") && !says("restarts are unknown")
+        says(&mission, "left out 300 messages of `1.bag`, recorded twice")
+            && !says(&mission, "restarts are unknown")
     );
     // `/driver` sends `/odom` in the recording that ends sooner.
     let stopped = mission
@@ -569,8 +566,7 @@ fn a_recording_of_which_nothing_is_read_is_compared_with_one_that_is_read() {
     };
     for ahead in [4_000_000, 3600 * SECOND] {
         let both = mission(&[recorder(true, 0), recorder(false, ahead)], |_, _| {});
-        let says = |text: &str| both.notices.iter().any(|n| n.text.contains(text));
-        assert!(says("left out 1800 messages"), "{:?}", both.notices);
+        assert!(says(&both, "left out 1800 messages"), "{:?}", both.notices);
         assert_eq!(both.span.nanos() / SECOND, 59);
     }
     // In simulated time it may be another run, so it is set aside.
@@ -578,7 +574,7 @@ fn a_recording_of_which_nothing_is_read_is_compared_with_one_that_is_read() {
         &[recorder(false, -ORIGIN + SECOND), recorder(true, 0)],
         |_, _| {},
     );
-    assert!(!both.notices.iter().any(|n| n.text.contains("left out")));
+    assert!(!says(&both, "left out"));
     assert!(both.span.start.0 >= ORIGIN);
 }
 
