@@ -120,6 +120,8 @@ pub(crate) const SAME_RATE: f64 = 1.1;
 pub(crate) const EVEN: f64 = 1.8;
 /// The largest ratio of the quartiles of sums of two even intervals, which scatter less by the square root of two.
 pub(crate) const EVEN_OF_TWO: f64 = 1.5;
+/// The longest tick of a coarse clock: simulators publish theirs ten times a second or more often.
+pub(crate) const TICK_NS: i64 = SECOND / 10;
 /// The fewest messages at a rate for it to be an event: five intervals.
 pub(crate) const FEWEST_OF_RATE: u64 = 6;
 /// The shortest duration of a rate that is an event.

@@ -199,8 +199,9 @@ pub(crate) struct ClockOffset {
     pub(crate) ahead: i64,
     /// The number of messages that show it.
     pub(crate) messages: usize,
-    /// Whether both recorded one robot: with stamps or on several topics, and in wall time or with a node of the same start in its name.
-    /// Otherwise two runs of a simulation may have equal messages at equal times.
+    /// Whether both recorded one robot: they have messages of most topics in common, with stamps or on several topics, and in wall time or
+    /// with a node of the same start in its name. Otherwise two runs of a simulation may have equal messages at equal times, or two robots
+    /// of one fleet receive the same.
     pub(crate) is_one_robot: bool,
 }
 
@@ -251,8 +252,8 @@ fn contents<'a>(
     })
 }
 
-/// The nanoseconds between a message in two bags, its topic, and whether it carries a stamp and is in wall time.
-type Lag<'a> = (i64, &'a str, [bool; 2]);
+/// The nanoseconds between a message in two bags, its topic, its time in the first, and whether it carries a stamp and is in wall time.
+type Lag<'a> = (i64, &'a str, Stamp, [bool; 2]);
 
 /// The pairs of bags that have messages in common, each bag with those before it.
 ///
@@ -263,6 +264,8 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
         return Ok(Vec::new());
     }
     let mut lags: BTreeMap<[usize; 2], Vec<Lag<'_>>> = BTreeMap::new();
+    // By topic and bag, the times of the messages whose contents are in it once.
+    let mut once: BTreeMap<&str, BTreeMap<usize, Vec<Stamp>>> = BTreeMap::new();
     let of = (0..streams.len()).filter(|at| !streams[*at].latched);
     for of in contents(streams, facts, of) {
         let of = of?;
@@ -276,11 +279,15 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
             let times = times.into_iter();
             let times = times.filter_map(|(bag, time)| Some((bag, time?)));
             let times: Vec<(usize, Stamp)> = times.collect();
+            for (bag, time) in &times {
+                let of_topic = once.entry(of.topic).or_default();
+                of_topic.entry(*bag).or_default().push(*time);
+            }
             for (at, (bag, time)) in times.iter().enumerate() {
                 for (other, before) in &times[..at] {
                     let is = [of.stamped, time.min(before).0 > UNSET_DAYS * DAY];
                     let lags = lags.entry([*bag, *other]).or_default();
-                    lags.push((time.since(*before), of.topic, is));
+                    lags.push((time.since(*before), of.topic, *time, is));
                 }
             }
         }
@@ -296,30 +303,46 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
         all.any(|(name, _)| started.contains(&(name, other)))
     };
     let all = lags.into_iter();
-    let found = all.filter_map(|(bags, lags)| offset(bags, lags, is_one_run(bags)));
+    let found = all.filter_map(|(bags, lags)| offset(bags, lags, &once, is_one_run(bags)));
     Ok(found.collect())
 }
 
-/// The common messages of two bags with these times between them; `None` without agreement.
+/// The common messages of two bags with these times between them; `None` without agreement. `once`: as in `offsets`.
 fn offset(
     [bag, other]: [usize; 2],
     mut lags: Vec<Lag<'_>>,
+    once: &BTreeMap<&str, BTreeMap<usize, Vec<Stamp>>>,
     is_one_run: bool,
 ) -> Option<ClockOffset> {
     lags.sort_unstable();
     let ahead = lags.get(lags.len() / 2)?.0;
     let near = lags.iter().filter(|lag| (lag.0 - ahead).abs() <= NEAR_NS);
     let messages = near.clone().count();
-    let is_stamped = near.clone().filter(|lag| lag.2[0]).count() >= FEWEST;
-    let is_set = near.clone().all(|lag| lag.2[1]);
-    let topics: BTreeSet<&str> = near.map(|lag| lag.1).collect();
+    let is_stamped = near.clone().filter(|lag| lag.3[0]).count() >= FEWEST;
+    let is_set = near.clone().all(|lag| lag.3[1]);
+    let topics: BTreeSet<&str> = near.clone().map(|lag| lag.1).collect();
+    let times = near.map(|lag| Span::new(lag.2, lag.2.plus(1)));
+    let common = times.reduce(|a, b| a.hull(b))?;
+    // Two robots may receive the same messages of their fleet, and send others on topics of one name.
+    let has_many = |of: &BTreeMap<usize, Vec<Stamp>>, bag: usize, by: i64| {
+        let times = of.get(&bag).into_iter().flatten();
+        let within = times.filter(|time| common.contains(time.plus(by)));
+        within.count() >= FEWEST
+    };
+    let compared = once
+        .iter()
+        .filter(|(_, of)| has_many(of, bag, 0) && has_many(of, other, ahead));
+    let differ = compared
+        .filter(|(topic, _)| !topics.contains(*topic))
+        .count();
     let is_clear = messages >= FEWEST && messages * 100 >= lags.len() * SHARE;
     (is_clear && (is_stamped || topics.len() >= TOPICS)).then_some(ClockOffset {
         bag,
         other,
         ahead,
         messages,
-        is_one_robot: (is_set || is_one_run) && (is_stamped || topics.len() > TOPICS),
+        is_one_robot: differ <= topics.len()
+            && (is_one_run || is_set && (is_stamped || topics.len() > TOPICS)),
     })
 }
 
@@ -521,13 +544,19 @@ mod tests {
                 .zip(other)
                 .zip(["/tf", "/odom"].into_iter().cycle());
             let lag = |((before, time), topic): ((&i64, &i64), _)| {
-                ((time - before) * 1_000_000, topic, [stamped, false])
+                let nanos = |ms| ms * 1_000_000;
+                (
+                    nanos(time - before),
+                    topic,
+                    Stamp(nanos(*time)),
+                    [stamped, false],
+                )
             };
             all.map(lag).collect()
         }
 
         fn found(lags: Vec<Lag<'_>>, is_one_run: bool) -> Option<(i64, usize, bool)> {
-            let found = offset([1, 0], lags, is_one_run)?;
+            let found = offset([1, 0], lags, &BTreeMap::new(), is_one_run)?;
             Some((found.ahead, found.messages, found.is_one_robot))
         }
 

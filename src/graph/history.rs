@@ -126,6 +126,14 @@ impl Stretch {
         1e9 / period.max(1.0)
     }
 
+    /// The time in which a message is expected, in nanoseconds: the usual one, and longer by the square of what was lost, since five in a
+    /// row are lost by chance where one in three is.
+    fn expected(&self) -> i64 {
+        let mean = self.last.since(self.first) as f64 / (self.count - 1).max(1) as f64;
+        let lost = (mean / self.period.max(1) as f64).max(1.0);
+        (self.period as f64 * lost * lost) as i64
+    }
+
     /// Whether it has a rate that is an event: even, and for long enough.
     pub(crate) fn has_rate(&self) -> bool {
         let lasts = self.last.since(self.first) >= RATE_HOLDS_NS;
@@ -271,7 +279,7 @@ pub(crate) fn silences(stretches: &[Stretch], lives: &[Span], pauses: &[Span]) -
                 continue;
             }
             let silence = next.unwrap_or(life.end).since(stretch.last);
-            let usual = broken_after(stretch.period).max(LONGER.saturating_mul(longest[1]));
+            let usual = broken_after(stretch.expected()).max(LONGER.saturating_mul(longest[1]));
             let is_alike = |gap: &&i64| gap.saturating_mul(LONGER) >= silence;
             // After a pause, a short silence to the end may be another one.
             let is_open = next.is_none() && longest[0] > 0;

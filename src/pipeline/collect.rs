@@ -35,7 +35,7 @@ pub(super) fn collect(
     let parts = graph::parts(&all.recorded);
     let pairs = copies::pairs(reading, &all.inputs, &all.recorded, &parts)?;
     let (shifts, mut notices) = copies::correct(reading, &pairs, &all.inputs);
-    let left_out = copies::copies(&all.recorded, &pairs, &shifts);
+    let left_out = copies::copies(&all.recorded, &pairs, &shifts)?;
     if !notices.is_empty() || !left_out.is_empty() {
         if let Some(merged) = &mut merged {
             copies::moved(merged, &shifts);

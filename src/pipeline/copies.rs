@@ -2,6 +2,7 @@
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
+use std::io;
 
 use super::Reading;
 use super::inputs::{affordable, given_offset, in_time, space_of};
@@ -217,39 +218,77 @@ pub(super) fn moved(copies: &mut Copies, shifts: &ById<usize, i64>) {
     }
 }
 
-/// The messages that are left out: of each topic those from the time of a bag that has more of them. What one recorder missed is
-/// not taken from another.
+/// The messages that are left out: whenever several bags recorded a topic of one robot, those of all but the one with most of them then.
+/// What that recorder missed is not taken from another.
 pub(super) fn copies(
     recorded: &Recorded,
     pairs: &[ClockOffset],
     shifts: &ById<usize, i64>,
-) -> Copies {
-    let is_pair = |a, b| pairs.iter().any(|pair| [pair.other, pair.bag] == [a, b]);
+) -> Result<Copies> {
+    let pairs: BTreeSet<[usize; 2]> = pairs.iter().map(|pair| [pair.other, pair.bag]).collect();
+    let is_pair = |a: usize, b: usize| pairs.contains(&[a.min(b), a.max(b)]);
+    let ahead = |bag: usize| shifts.get(bag).copied().unwrap_or(0);
+    let moved = |span: Span, by| Span::new(span.start.plus(by), span.end.plus(by));
     let spans = spans(recorded);
+    let span = |bag| spans.some(bag).map(|span| moved(*span, ahead(bag)));
     let mut copies = Copies::default();
-    for bags in by_key(recorded).values().filter(|bags| bags.len() > 1) {
-        // Of a latched topic the first message counts, as it was there before.
-        let rank = |bag: &usize| {
-            let streams = || bags[bag].iter().map(|at| &recorded.streams[*at]);
-            let bounds = streams().filter_map(|s| recorded.messages.bounds(s.times));
-            let first = bounds.map(|(first, _)| first).min();
-            let count: u64 = streams().map(|s| recorded.messages.count(s.times)).sum();
-            let first = first.filter(|_| streams().all(|stream| stream.latched));
-            (Reverse(first), count, Reverse(*bag))
-        };
-        for (bag, own) in bags {
-            let is_better = |other: &&usize| {
-                is_pair(*bag.min(other), *bag.max(other)) && rank(other) > rank(bag)
-            };
-            for other in bags.keys().filter(is_better) {
-                let by = shifts.get(*other).copied().unwrap_or(0);
-                let covered = spans.some(*other).map(|span| {
-                    let (start, end) = (span.start.plus(by), span.end.plus(by));
-                    Span::new(start.plus(-NEAR_NS), end.plus(NEAR_NS))
-                });
-                for at in own {
-                    let id = recorded.streams[*at].connection.id;
-                    copies.grown(*bag).entry(id).or_default().extend(covered);
+    let all = by_key(recorded);
+    for bags in all.values().filter(|_| !pairs.is_empty()) {
+        let streams = |bag: usize| bags[&bag].iter().map(|at| &recorded.streams[*at]);
+        // The bags whose recording begins or ends at a time.
+        let mut edges: BTreeMap<Stamp, Vec<usize>> = BTreeMap::new();
+        for (bag, span) in bags.keys().filter_map(|bag| Some((*bag, span(*bag)?))) {
+            edges.entry(span.start).or_default().push(bag);
+            edges.entry(span.end).or_default().push(bag);
+        }
+        let mut here = BTreeSet::new();
+        let mut edges = edges.into_iter().peekable();
+        while let Some((start, changed)) = edges.next() {
+            for bag in changed {
+                if !here.remove(&bag) {
+                    here.insert(bag);
+                }
+            }
+            let is_twice = |bag: &&usize| here.iter().any(|other| is_pair(**bag, *other));
+            let Some((end, _)) = edges.peek() else { break };
+            let part = Span::new(start, *end);
+            let mut ranked = Vec::new();
+            for bag in here.iter().filter(is_twice) {
+                let own = moved(part, -ahead(*bag));
+                let many = streams(*bag).map(|s| recorded.messages.count_in(s.times, own));
+                let many = many.sum::<io::Result<u64>>().map_err(spool_error)?;
+                let whole: u64 = streams(*bag)
+                    .map(|s| recorded.messages.count(s.times))
+                    .sum();
+                // Of a latched topic the first message counts, as it was there before.
+                let bounds = streams(*bag).filter_map(|s| recorded.messages.bounds(s.times));
+                let first = bounds.map(|(first, _)| first.plus(ahead(*bag))).min();
+                let first = first.filter(|_| streams(*bag).all(|stream| stream.latched));
+                ranked.push((first, many, Reverse(whole), *bag));
+            }
+            // One message more or less at each edge shows no loss.
+            let most = ranked.iter().map(|of| of.1).max().unwrap_or(0);
+            ranked.sort_unstable_by_key(|(first, many, whole, bag)| {
+                (*first, many + 2 < most, *whole, *bag)
+            });
+            let mut kept: Vec<usize> = Vec::new();
+            for (.., bag) in ranked {
+                let Some(better) = kept.iter().find(|other| is_pair(**other, bag)) else {
+                    kept.push(bag);
+                    continue;
+                };
+                // At the edges of a recording its messages may be recorded a little sooner or later.
+                let edge =
+                    |of: fn(Span) -> Stamp| span(*better).is_some_and(|span| of(span) == of(part));
+                let covered = Span::new(
+                    part.start
+                        .plus(if edge(|span| span.start) { -NEAR_NS } else { 0 }),
+                    part.end
+                        .plus(if edge(|span| span.end) { NEAR_NS } else { 0 }),
+                );
+                for stream in streams(bag) {
+                    let of_bag = copies.grown(bag).entry(stream.connection.id);
+                    of_bag.or_default().push(covered);
                 }
             }
         }
@@ -257,7 +296,7 @@ pub(super) fn copies(
     for spans in copies.iter_mut().flat_map(BTreeMap::values_mut) {
         *spans = Span::joined(std::mem::take(spans), 0);
     }
-    copies
+    Ok(copies)
 }
 
 /// A sink that passes everything on but what another bag, or the same, contains.

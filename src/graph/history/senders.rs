@@ -5,7 +5,9 @@ use std::io;
 
 use crate::base::error::Result;
 use crate::base::name::is_feedback;
-use crate::base::rhythm::{EVEN, EVEN_OF_TWO, FEWEST, FEWEST_INTERVALS, GAP, GAP_NS, SAME_RATE};
+use crate::base::rhythm::{
+    EVEN, EVEN_OF_TWO, FEWEST, FEWEST_INTERVALS, GAP, GAP_NS, SAME_RATE, TICK_NS,
+};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
@@ -346,7 +348,9 @@ fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
     let is_even = times.len() > FEWEST_INTERVALS && upper as f64 <= EVEN * lower.max(1) as f64;
     let is_many = times.len() > 4 * FEWEST_INTERVALS;
     // By a coarse clock, single intervals are long or short, and their sums are even.
-    let ([low, _, up], of_two) = quartiles(if is_many && !is_even { times } else { &[] }, 2);
+    let uneven = if is_many && !is_even { times } else { &[] };
+    let ([low, _, up], of_two) = quartiles(uneven, 2);
+    let is_even = is_even || are_lost(uneven, lower, median, upper);
     let are_sums_even = low > 0 && up as f64 <= EVEN_OF_TWO * low as f64 && upper <= lower * 3;
     Some(Stretch {
         first,
@@ -361,6 +365,25 @@ fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
         is_even: is_even || are_sums_even,
         is_joined,
     })
+}
+
+/// Whether less than half of the messages were lost between these, as their intervals with these quartiles show: most are whole periods,
+/// and too long for the tick of a coarse clock, or sums of four scatter by more than one tick.
+fn are_lost(times: &[Stamp], lower: i64, median: i64, upper: i64) -> bool {
+    let sums = times.iter().zip(times.iter().skip(4));
+    let mut sums: Vec<i64> = sums.map(|(a, b)| b.since(*a)).collect();
+    sums.sort_unstable();
+    let Some((low, high)) = sums.get(sums.len() / 10).zip(sums.get(sums.len() * 9 / 10)) else {
+        return false;
+    };
+    let quarter = lower / 4;
+    let is_off = |t: &&[Stamp]| {
+        let part = t[1].since(t[0]).rem_euclid(lower.max(1));
+        (quarter..lower - quarter).contains(&part)
+    };
+    let off = times.windows(2).filter(is_off).count();
+    let is_scattered = lower > TICK_NS || (high - low) / 3 > (upper - lower) / 2;
+    is_scattered && lower > 0 && median - lower <= quarter && off * 10 <= times.len()
 }
 
 /// The quartiles of the sums of so many intervals, and the usual sum: of intervals about as long as the median, and exactly the mean of
@@ -459,6 +482,26 @@ mod tests {
             let kept: Vec<Stamp> = kept.collect();
             let joined = stretches(&kept).iter().filter(|s| s.is_joined).count();
             assert_eq!(joined, 0, "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn messages_lost_from_a_moment_on_change_no_rate() {
+        for (loss, hz) in [(20, 2), (25, 10), (30, 4), (35, 20)] {
+            let all = times(&[(1200, 1000 / hz)]);
+            for seed in 0..20_u64 {
+                let mut dice = seed;
+                let kept = all.iter().copied().enumerate().filter(|(at, _)| {
+                    dice = dice
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1_442_695_041);
+                    *at < 600 || (dice >> 33) % 100 >= loss
+                });
+                let kept: Vec<Stamp> = kept.map(|(_, time)| time).collect();
+                let found = stretches(&kept);
+                let same = found.iter().all(|s| is_same(s, &found[0]) && !s.is_joined);
+                assert!(same, "{loss} {hz} {seed} {found:?}");
+            }
         }
     }
 
