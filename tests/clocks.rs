@@ -52,6 +52,9 @@ impl Sink for Copied {
     fn notice(&mut self, _: Notice) {}
 }
 
+/// The topics whose contents show nodes.
+const LOGS: [&str; 3] = ["/rosout", "/rosout_agg", "/statistics"];
+
 /// The healthy recording, with its first moment and its length.
 struct Healthy {
     all: Recording,
@@ -92,12 +95,12 @@ impl Healthy {
         copy
     }
 
-    /// The recording of another robot, with other contents, this much later.
-    fn another(&self, later: i64) -> Recording {
+    /// The recording of another robot, with other contents but on the topics that both read, this much later.
+    fn another(&self, later: i64, read: &[&str]) -> Recording {
         let mut copy = self.copy(|_, at| Some(at + later));
         for (publisher, _, payload) in &mut copy.messages {
             let topic = &self.all.publishers[*publisher].topic;
-            let is_read = ["/rosout", "/rosout_agg", "/statistics"].contains(&topic.as_str());
+            let is_read = read.contains(&topic.as_str());
             if let Some(last) = payload.last_mut().filter(|_| !is_read) {
                 *last ^= 1;
             }
@@ -255,7 +258,7 @@ fn clock_faults_are_attributed_to_the_recorder() {
             "two robots with the same names",
             vec![
                 healthy.copy(|_, at| Some(at)),
-                healthy.another(5_012_345_678),
+                healthy.another(5_012_345_678, &LOGS),
             ],
         ),
         (
@@ -318,7 +321,7 @@ fn two_robots_with_the_same_names_are_distinguished_by_a_namespace() {
     let alone = mission(&[healthy.copy(|_, at| Some(at))], |_, _| {});
     let both = [
         healthy.copy(|_, at| Some(at)),
-        healthy.another(5_012_345_678),
+        healthy.another(5_012_345_678, &LOGS),
     ];
     let both = mission(&both, |reading, paths| {
         reading
@@ -343,6 +346,41 @@ fn two_robots_with_the_same_names_are_distinguished_by_a_namespace() {
         );
     }
     assert!(!says(&both, "restarts are unknown"));
+}
+
+#[test]
+fn two_robots_that_receive_the_same_of_their_fleet_are_two() {
+    let healthy = Healthy::new();
+    let common = [&LOGS[..], &["/robot1/odom", "/robot2/odom"]].concat();
+    let both = [
+        healthy.copy(|_, at| Some(at)),
+        healthy.another(2_000_000, &common),
+    ];
+    let both = mission(&both, |_, _| {});
+    assert!(!says(&both, "recorded twice"), "{:?}", both.notices);
+    assert!(says(&both, "restarts of these nodes are unknown"));
+}
+
+#[test]
+fn what_one_recorder_loses_is_taken_from_the_other() {
+    let healthy = Healthy::new();
+    let mut dice = 7_u64;
+    let mut loses = |percent: u64| {
+        dice = dice
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (dice >> 33) % 100 < percent
+    };
+    let lossy = healthy.copy(|_, at| (!loses(25)).then_some(at));
+    let end = healthy.length / 10 * 7;
+    let complete = healthy.copy(|_, at| (at < end).then_some(at + 800_000_000 + at % 5_000_000));
+    let both = mission(&[lossy, complete], |_, _| {});
+    let alone = mission(&[healthy.copy(|_, at| Some(at))], |_, _| {});
+    let rates = |mission: &Mission| {
+        let all = headlines(mission).into_iter();
+        all.filter(|of| of.0 != Kind::Silent).collect::<Vec<_>>()
+    };
+    assert_eq!(rates(&both), rates(&alone));
 }
 
 #[test]

@@ -23,6 +23,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::{ById, NodeId, TopicId};
+use crate::base::cast::to_i64;
 use crate::base::rhythm::{
     ALIKE, FEWEST, FEWEST_OF_RATE, GONE_NS, LONGER, OFTEN, RATE_HOLDS_NS, STEADY, STEADY_NS,
     broken_after,
@@ -131,7 +132,7 @@ impl Stretch {
     fn expected(&self) -> i64 {
         let mean = self.last.since(self.first) as f64 / (self.count - 1).max(1) as f64;
         let lost = (mean / self.period.max(1) as f64).max(1.0);
-        (self.period as f64 * lost * lost) as i64
+        to_i64(self.period as f64 * lost * lost)
     }
 
     /// Whether it has a rate that is an event: even, and for long enough.
