@@ -29,10 +29,10 @@ use crate::graph::{ById, Element};
 use crate::mission::Mission;
 
 pub(crate) use filtered::filtered;
+pub use fold::box_rows::BoxRow;
 pub(crate) use fold::namespaces::COMMON;
 pub use fold::namespaces::Collapsible;
 pub(crate) use fold::namespaces::headlines;
-pub use fold::rows::BoxRow;
 pub(crate) use frames::{BETWEEN_PHRASES, Words, joined};
 pub use frames::{Frame, Headline, Phrase};
 pub(crate) use listed::{DrawnPart, drawn_part};

@@ -155,3 +155,36 @@ fn frames_show_lifetimes_below_the_graph() {
     assert!(names[0].contains("emergency_stop") && names[0].contains("object_detector"));
     assert!(svg.split("id=\"phases\"").nth(1).unwrap().contains("<text"));
 }
+
+#[test]
+fn a_readme_shows_all_rows_on_a_page_as_high_as_they_are() {
+    let height = |name: &str| -> f64 {
+        let flags = ["--for", "readme", "--mode", "topics", "--period", "all"];
+        let (folder, done) = rendered(name, &flags, &["x.svg"]);
+        assert!(done.status.success(), "{}", said(&done));
+        let svg = text(&folder, "x.svg");
+        let all = svg.split("viewBox=\"0 0 830 ").nth(1).unwrap();
+        all.split('"').next().unwrap().parse().unwrap()
+    };
+    assert!(height("courier.mcap") < 400.0);
+    let warehouse = height("warehouse.bag");
+    assert!((900.0..=1100.0).contains(&warehouse), "{warehouse}");
+}
+
+#[test]
+fn a_mission_in_one_window_has_rates_while_they_were_sent() {
+    let svg_of = |mode: &str| {
+        let (folder, done) = rendered(
+            "courier.mcap",
+            &["--period", "all", "--mode", mode],
+            &["x.svg"],
+        );
+        assert!(done.status.success(), "{}", said(&done));
+        text(&folder, "x.svg")
+    };
+    // `/plan` has one message a second, then one in four; three messages have no rate; an unknown node sends `/scan`.
+    let topics = svg_of("topics");
+    assert!(topics.contains(">1 → 0.25 Hz<") && topics.contains(">3 msg<"));
+    assert!(!topics.contains("playhead"));
+    assert!(svg_of("nodes").contains(">scan 5 Hz<"));
+}

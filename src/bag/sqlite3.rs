@@ -4,7 +4,7 @@
 
 mod db;
 mod growing;
-mod place;
+mod ready;
 mod rows;
 
 use std::collections::{BTreeMap, HashMap};
@@ -24,7 +24,7 @@ use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
 use db::{Db, Refusal};
-use place::Ready;
+use ready::Ready;
 use rows::{RowRange, RowReader, ZSTD};
 
 /// ROS 2 bags in SQLite.
@@ -63,7 +63,7 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
             return Err(Error::unsupported(name, what, "save it to a file first"));
         }
     };
-    let ready = place::ready(source.path())?;
+    let ready = ready::ready(source.path())?;
     bag(ready, &source, options).map(|bag| Box::new(bag) as Box<dyn Reader>)
 }
 

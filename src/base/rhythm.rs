@@ -3,8 +3,7 @@
 //! Times are in nanoseconds. Only thresholds that decide whether something happened belong here, not drawing sizes or
 //! window lengths.
 
-/// A second.
-const SECOND: i64 = 1_000_000_000;
+use super::time::SECOND;
 
 // ---- A rhythm, and its end.
 

@@ -16,7 +16,9 @@ use super::{cast, words};
 )]
 pub struct Stamp(pub i64);
 
-const SECOND: i64 = 1_000_000_000;
+/// A second and a day, in nanoseconds.
+pub(crate) const SECOND: i64 = 1_000_000_000;
+pub(crate) const DAY: i64 = 86_400 * SECOND;
 
 impl Stamp {
     /// The earliest stamp.
@@ -214,7 +216,6 @@ pub(crate) fn round_length(least: i64) -> i64 {
         1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 30_000, 60_000,
         120_000, 300_000, 600_000, 1_200_000, 1_800_000, 3_600_000, 7_200_000, 21_600_000,
     ];
-    const DAY: i64 = 86_400 * SECOND;
     let mut steps = STEPS.iter().map(|millis| millis * (SECOND / 1000));
     let found = steps.find(|step| *step >= least);
     found.unwrap_or_else(|| ((least - 1) / DAY + 1).saturating_mul(DAY))

@@ -15,7 +15,7 @@ pub(crate) use legend::{LegendSign, signs};
 mod measured;
 pub(crate) mod options;
 pub(crate) mod page;
-mod presence;
+mod presence_bar;
 mod room;
 mod spaces;
 mod spotlight;

@@ -243,7 +243,7 @@ impl<'a> StripSource<'a> {
         let line = Stroke::solid(self.style.legend.line, 0.5);
         panel.shape(Shape::line(Form::Rect(border, 0.0), line));
         let start = self.mission.span.start;
-        let time = |at: time::Stamp| words::moment(at.since(start));
+        let time = |at: time::Stamp| words::moment_rounded(at.since(start));
         let mut times = format!("{}–{}", time(frame.span.start), time(frame.span.end));
         if let Some(phase) = self.picture.phase(window) {
             times = format!("{times} {phase}");

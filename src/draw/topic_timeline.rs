@@ -27,8 +27,6 @@ use crate::view::{Frame, View};
 const SCALE: (f64, f64) = (4.26, 5.6);
 /// The width of the page if the user chose none: its text is legible in a column of a web page.
 const NARROW: f64 = 960.0;
-/// The largest page that a timeline grows to if the user chose none.
-const LARGEST: Size = Size::new(1920.0, 1080.0);
 /// The height below the rows in millimetres, for nodes and for the line that explains why this is not a graph.
 const BELOW: f64 = 9.0;
 /// The height of the line of nodes in millimetres.
@@ -59,16 +57,16 @@ pub struct Overview {
 }
 
 impl<'a> TopicTimeline<'a> {
-    /// The timeline of the nodes and topics that pass the filters of `source`. Unless `is_sized`, the page
-    /// grows until all topics are legible. If they still do not fit, those of a namespace that exist throughout are one
-    /// row, else all that begin and end together.
+    /// The timeline of the nodes and topics that pass the filters of `source`. The page is as high as its rows, and grows
+    /// to `largest` unless all topics are legible; without one, it has the size that the user chose. If they still do not
+    /// fit, those of a namespace that exist throughout are one row, else all that begin and end together.
     pub(crate) fn new(
         source: &'a FigureSource<'a>,
         view: &'a View,
         style: &'a Style,
         fonts: &'a Fonts,
         mut options: PageOptions,
-        is_sized: bool,
+        largest: Option<Size>,
     ) -> Self {
         let rows: Vec<Row> = of_topics(source).into_iter().map(Row::plain).collect();
         let (topics, pitch) = (rows.len(), Sizes::SCREEN.pitch());
@@ -80,10 +78,10 @@ impl<'a> TopicTimeline<'a> {
             let free = room(style, options).h / SCALE.0 - others;
             cast::to_usize((free / pitch).max(1.0))
         };
-        if !is_sized {
+        if let Some(largest) = largest {
             options.size.w = options.size.w.min(NARROW);
             if most(&options) < timeline.rows.len() {
-                options.size = LARGEST;
+                options.size = largest;
             }
         }
         let most = most(&options);
@@ -95,10 +93,9 @@ impl<'a> TopicTimeline<'a> {
         }
         let room = room(style, &options);
         let high = others + timeline.rows.len() as f64 * pitch;
-        let largest = SCALE.1 * unit(&options).max(1.0);
-        let scale = (room.h / high).clamp(SCALE.0, largest);
+        let scale = (room.h / high).clamp(SCALE.0, SCALE.1 * unit(&options).max(1.0));
         let page = PageFrame::new(style, &options, 0, Strip::Timeline);
-        if !is_sized {
+        if largest.is_some() {
             // A short timeline has no empty space below; encoders of video need an even number of rows.
             let end = libm::ceil(f64::midpoint(room.y, high * scale)) * 2.0;
             options.size.h = end.min(options.size.h);
@@ -122,8 +119,9 @@ impl<'a> TopicTimeline<'a> {
     pub(crate) fn scene(&self, k: usize) -> Scene {
         let many = self.view.frames.len();
         let phase = self.options.phases.get(k).map_or("", String::as_str);
-        let frame = self.view.frames.get(k);
-        let page = frame.map(|frame| self.page(frame, phase, true));
+        // In a single window, rates are those while they were sent.
+        let page = |frame| self.page(frame, phase, many > 1);
+        let page = self.view.frames.get(k).map(page);
         Scene {
             title: format!("{}, window {} of {many}", self.options.title(), k + 1),
             ..page.unwrap_or_default()
@@ -172,8 +170,8 @@ impl<'a> TopicTimeline<'a> {
             } else {
                 Some(row.rates())
             };
-            let rate = rate.as_deref();
-            let (text, color) = rate.map_or(("–", ink::QUIET), |rate| (rate, ink::TEXT));
+            let rate = rate.as_deref().map(|rate| (rate, ink::TEXT));
+            let (text, color) = rate.unwrap_or(("–", ink::QUIET));
             self.drawer.rate(&mut canvas, self.drawer.y(k), text, color);
         }
         canvas.begin("nodes");
@@ -183,7 +181,12 @@ impl<'a> TopicTimeline<'a> {
         canvas.begin("why");
         let wide = self.options.size.w / self.scale - 2.0 * self.drawer.left;
         let why = self.why();
-        let signs = format!("{why}. Tick: first message; cross: last; frame: this window.");
+        let window = if is_window {
+            "; frame: this window"
+        } else {
+            ""
+        };
+        let signs = format!("{why}. Tick: first message; cross: last{window}.");
         let fits = canvas.width(&signs, Type::Small) <= wide;
         let why = canvas.cut(if fits { &signs } else { why }, Type::Small, wide);
         let y = end + LABEL + 1.6 + Sizes::SCREEN.line() / 2.0;
@@ -225,13 +228,15 @@ impl<'a> TopicTimeline<'a> {
         let roles = self.source.roles.iter();
         let roles = roles.filter(|(_, nodes)| nodes.iter().any(is_shown));
         let names: Vec<String> = roles.map(|(role, _)| role.to_string()).collect();
-        let (left, x) = (self.drawer.left, self.drawer.axis.left);
+        let (left, title) = (self.drawer.left, "nodes known");
+        let after = left + canvas.width(title, Type::Small) + 1.2;
+        let x = self.drawer.axis.left.max(after);
         let room = self.options.size.w / self.scale - left - x;
         let fits = |text: &str| canvas.width(text, Type::Small) <= room;
         let text = fitting(&names, names.len(), fits);
         if !names.is_empty() {
             let y = self.drawer.end() + Sizes::SCREEN.line() + 2.0 + LABEL / 2.0;
-            canvas.text(left, y, Type::Small, ink::QUIET, "nodes known");
+            canvas.text(left, y, Type::Small, ink::QUIET, title);
             canvas.text(x, y, Type::Small, ink::TEXT, &text);
         }
     }

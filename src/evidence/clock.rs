@@ -10,12 +10,11 @@ use crate::base::name::NodeName;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::GAP_NS;
 use crate::base::role::start;
-use crate::base::time::{Span, Stamp};
+use crate::base::time::{DAY, Span, Stamp};
 use crate::evidence::inference::Stream;
 use crate::evidence::observation::Observations;
 use crate::evidence::times::{Calendar, Timed};
 
-pub(crate) const DAY: i64 = 86_400_000_000_000;
 /// The distance in days beyond which times count as far from all others: no mission has a pause of a year.
 pub(crate) const FAR_DAYS: i64 = 365;
 /// The most far messages that are set aside, as one in so many messages: more are no accident, but a clock that jumped. Accidents

@@ -11,7 +11,7 @@ use std::sync::{Mutex, PoisonError};
 use tempfile::SpooledTempFile;
 
 use crate::base::ids::{ById, ids};
-use crate::base::time::{Span, Stamp};
+use crate::base::time::{DAY, Span, Stamp};
 use crate::base::varint::{put, take_u64};
 
 /// The number of stamps per block: enough for a block's head (32 bytes) to be negligible, few enough to sort
@@ -23,7 +23,6 @@ const IN_MEMORY: usize = 16 << 20;
 /// The number of stamps not yet in a block, of all series together (8 MB), at which all of them are put into blocks: with 20,000
 /// topics each has 26 by then, so that blocks are not mostly head.
 const MOST_OPEN: usize = 1 << 19;
-const DAY: i64 = 86_400_000_000_000;
 
 /// The messages of one bag by day.
 #[derive(Clone, Debug, Default)]

@@ -10,7 +10,7 @@ use super::values::{Pattern, Range};
 use crate::base::budget;
 use crate::base::ids::grouped;
 use crate::base::rhythm::{CLOSING_NS, FEWEST, FEWEST_OF_MEAN, GAP_NS};
-use crate::base::time::{Period, Stamp};
+use crate::base::time::{Period, SECOND, Stamp};
 use crate::base::words::{self, visible_json};
 use crate::graph::history::Bound;
 use crate::mission::Mission;
@@ -40,8 +40,6 @@ const ENDED_NS: i64 = CLOSING_NS / 2;
 
 /// The time range for a first message at any time.
 const ANY_TIME: &str = "0..";
-
-const SECOND: i64 = 1_000_000_000;
 
 /// A generated expectation.
 #[derive(Debug, Default)]

@@ -670,10 +670,10 @@ impl<'a> Facts<'a> {
     /// if single messages are unknown.
     pub(crate) fn longest_silence(&self, topic: TopicId) -> i64 {
         let longest = self.longest_of(topic, true).unwrap_or(0);
-        if self.mission.sending.pauses.is_empty() {
-            longest.max(self.mission.period.nanos())
-        } else {
+        if self.mission.sending.knows_messages() {
             longest
+        } else {
+            longest.max(self.mission.period.nanos())
         }
     }
 

@@ -189,6 +189,11 @@ pub struct Sending {
 }
 
 impl Sending {
+    /// Whether single messages are known, not only their number in each window.
+    pub(crate) fn knows_messages(&self) -> bool {
+        !self.pauses.is_empty()
+    }
+
     /// The senders of a topic.
     pub(crate) fn of_topic(&self, topic: TopicId) -> &[Sender] {
         let from = self.senders.partition_point(|s| s.topic < topic);

@@ -2,10 +2,9 @@
 
 use crate::base::budget;
 use crate::base::error::{Error, Result};
-use crate::base::time::{Moment, Period, Span, Stamp};
+use crate::base::time::{Moment, Period, SECOND, Span, Stamp};
 use crate::base::words::{self, worded};
 
-const SECOND: i64 = 1_000_000_000;
 /// The periods for a bag shorter than five minutes, in milliseconds, the longest first.
 const SHORT: [i64; 9] = [30_000, 20_000, 10_000, 5000, 2000, 1000, 500, 200, 100];
 /// The periods for a bag longer than 600 minutes, in seconds, the shortest first.

@@ -5,9 +5,9 @@
 pub(crate) mod acyclic;
 pub(crate) mod blocks;
 pub(crate) mod crossings;
-pub(crate) mod fold;
 pub(crate) mod inside;
 pub(crate) mod labels;
+pub(crate) mod layer_fold;
 pub(crate) mod order;
 pub(crate) mod parts;
 pub(crate) mod place;
@@ -267,11 +267,11 @@ fn rankings(part: &Component, options: &LayoutOptions) -> Vec<Vec<usize>> {
     for reversed in ways {
         let (rank, edges) = ranked(&reversed);
         let near = if options.is_tight { 2 } else { 0 };
-        let counts = fold::suitable(n, aspect)
+        let counts = layer_fold::suitable(n, aspect)
             .into_iter()
             .flat_map(|many| many.saturating_sub(near)..=many + near);
         let folded: Vec<_> = counts
-            .map(|many| fold::fold(&rank, &edges, &part.home, many))
+            .map(|many| layer_fold::fold(&rank, &edges, &part.home, many))
             .collect();
         rankings.push(rank);
         rankings.extend(folded.into_iter().flatten());

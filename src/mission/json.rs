@@ -6,7 +6,7 @@
 mod columns;
 mod elements;
 mod events;
-mod lines;
+mod formatter;
 mod read;
 mod write;
 

@@ -6,7 +6,7 @@
 //! not cause boundaries, and the majority graph of a phase is its configuration. The result depends on the mission
 //! alone, never on `--period`.
 
-mod grid;
+mod cells;
 mod name;
 mod partition;
 mod presence;
@@ -46,7 +46,7 @@ pub fn phases(elements: &Elements, sending: &Sending, whole: Span) -> Vec<Phase>
         return Vec::new();
     }
     let present = presences(elements, sending, whole);
-    let cells = grid::grid(whole);
+    let cells = cells::cells(whole);
     let widths: Vec<i64> = cells.iter().map(Span::nanos).collect();
     let rows: Vec<Vec<bool>> = present.iter().map(|p| p.cells(&cells)).collect();
     let cuts = partition(&widths, &rows);

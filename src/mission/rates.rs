@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::Mission;
 use super::event_log::Kind;
+use crate::base::name::is_unnamed;
 use crate::base::rhythm::FEWEST;
 use crate::base::time::{Span, Stamp};
 use crate::graph::history::{Sender, Sending, Stretch};
@@ -62,14 +63,15 @@ impl<'a> Rates<'a> {
         }
     }
 
-    /// The messages of some publications; for the only one of its topic, all that are not known to come from
-    /// others. A latched publication represents its node by its message, and has no rate.
+    /// The messages of some publications; for the only one of its topic, and for those of unknown publishers, all that are
+    /// not known to come from others. A latched publication represents its node by its message, and has no rate.
     pub(crate) fn senders(&self, edges: &[EdgeId]) -> Vec<&'a Sender> {
         let sending = &self.mission.sending;
         let sender = |id: &EdgeId| {
             let edge = self.mission.elements.publishes.get(*id)?;
             let own = sending.of_edge(edge.node, edge.topic);
-            let is_sole = self.sole.get(edge.topic) == Some(&Some(*id));
+            let is_sole = self.sole.get(edge.topic) == Some(&Some(*id))
+                || is_unnamed(self.mission.elements.nodes[edge.node].name.as_str());
             let mut of_topic = sending.of_topic(edge.topic).iter();
             own.or_else(|| of_topic.find(|s| s.node.is_none()).filter(|_| is_sole))
         };

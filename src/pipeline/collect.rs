@@ -23,6 +23,14 @@ pub(super) struct Collected {
     pub(super) range: Span,
 }
 
+/// A bag that was read.
+struct ReadBag {
+    report: Report,
+    seams: Vec<Seam>,
+    /// The number of its messages that were left out because they are recorded twice.
+    left_out: u64,
+}
+
 /// Reads every bag once, and again if several recorded one robot or two recordings of it were merged; with `verify` by the second,
 /// independent reader. Adds the offsets of clocks that it finds to the reading.
 pub(super) fn collect(
@@ -97,13 +105,17 @@ fn once(
             let mut once = Rest::new(&mut watched, merged, bag);
             let report = reader.read(range, &mut once)?;
             let again = once.left_out;
-            all.push((report, watched.seams(), again + rest.left_out));
+            all.push(ReadBag {
+                report,
+                seams: watched.seams(),
+                left_out: again + rest.left_out,
+            });
             before += std::mem::take(&mut size);
         }
         Ok::<_, Error>((collector.finish()?, all))
     };
     let (mut recorded, mut all) = pass(&[], merged.as_ref().unwrap_or(&Copies::default()))?;
-    let mut seams: Vec<Vec<Seam>> = all.iter().map(|of| of.1.clone()).collect();
+    let mut seams: Vec<Vec<Seam>> = all.iter().map(|bag| bag.seams.clone()).collect();
     let is_pipe = inputs.iter().any(Input::is_pipe);
     let (is_known, found) = match merged.take() {
         Some(known) => (true, known),
@@ -130,9 +142,9 @@ fn once(
     }
     recorded.notices.extend(twice);
     recorded.notices.extend(gap(&recorded, &inputs));
-    let left_out = all.iter().map(|of| &of.2).zip(&inputs);
-    let left_out = left_out.filter(|(many, _)| **many > 0);
-    recorded.notices.extend(left_out.map(twice_recorded));
+    let notices = all.iter().zip(&inputs);
+    let notices = notices.filter_map(|(bag, input)| twice_recorded(bag.left_out, input));
+    recorded.notices.extend(notices);
     let falls = seams
         .iter()
         .flat_map(|seams| straight::falls(seams, !is_pipe));
@@ -155,7 +167,7 @@ fn once(
     }
     Ok(Collected {
         inputs,
-        reports: all.into_iter().map(|of| of.0).collect(),
+        reports: all.into_iter().map(|bag| bag.report).collect(),
         recorded,
         range,
     })
@@ -190,11 +202,11 @@ fn gap(recorded: &Recorded, inputs: &[Input]) -> Option<Notice> {
     Some(Notice::new(NoticeKind::Apart, text))
 }
 
-/// The notice about messages of a bag that another one, or the same, contains before.
-fn twice_recorded((many, input): (&u64, &Input)) -> Notice {
-    let (many, name) = (words::count(*many, "message"), input.name());
-    let text = format!("left out {many} of `{name}`, recorded twice");
-    Notice::new(NoticeKind::Note, text)
+/// The notice about messages of a bag that another one, or the same, contains before, if there are `many` of them.
+fn twice_recorded(many: u64, input: &Input) -> Option<Notice> {
+    let (count, name) = (words::count(many, "message"), input.name());
+    let text = format!("left out {count} of `{name}`, recorded twice");
+    (many > 0).then(|| Notice::new(NoticeKind::Note, text))
 }
 
 /// The beginning of the notice about a clock that was set back.

@@ -19,7 +19,7 @@ use crate::view::{COMMON, Collapsible, ItemId, Mode, ViewOptions, headlines};
 /// The style used to decide what is drawn.
 const PLAIN: &str = "light";
 /// The largest page that `--fit auto` grows to.
-const LARGEST: Size = Size::new(1920.0, 1080.0);
+pub(super) const LARGEST: Size = Size::new(1920.0, 1080.0);
 /// The fewest boxes that collapsing a namespace must save if its changing elements stay outside.
 const FEWEST_STEADY: usize = 3;
 /// The share of the smallest legible text below which changing elements of a namespace are collapsed too.

@@ -15,7 +15,7 @@ use crate::bag::{self, Input, InputKind, Report};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::rhythm::CLOSE_NS;
-use crate::base::time::{Span, Stamp};
+use crate::base::time::{DAY, Span, Stamp};
 use crate::base::{budget, cast, file, words};
 use crate::evidence::EvidenceLine;
 #[cfg(feature = "source")]
@@ -196,8 +196,6 @@ pub(super) fn so_far(collected: &Collected, reading: &Reading) -> Result<Mission
     let history = made(&collected.recorded, &mut findings, &traffic)?;
     mission(collected, &findings, history, None, reading)
 }
-
-const DAY: i64 = 86_400_000_000_000;
 
 /// Checks a mission in JSON against the limits of bags; returns the reason and a hint if it exceeds one.
 fn bounded(mission: &Mission) -> std::result::Result<(), (String, &'static str)> {

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use super::compose::Composed;
-use super::fit::fitted;
+use super::fit::{LARGEST, fitted};
 use super::unfolded::Opened;
 use super::{Body, Drawing, Reading, Stage, Watch, figure, read};
 use crate::base::cast;
@@ -418,10 +418,14 @@ impl<'a> Showing<'a> {
         let (drawing, mission) = (&self.drawing, self.mission);
         let composed = self.unplaced(drawing);
         let source = self.source(false);
-        let page = drawing.page.clone();
-        let is_sized = drawing.is_sized || !drawing.is_fitted;
-        let (style, fonts) = (&drawing.style, &drawing.fonts);
-        let timeline = TopicTimeline::new(&source, &composed.view, style, fonts, page, is_sized);
+        // A slide has one size.
+        let largest = match &drawing.medium {
+            Some(medium) => medium.sizes.last().filter(|_| medium.sizes.len() > 1),
+            None => (!drawing.is_sized).then_some(&LARGEST),
+        };
+        let largest = largest.filter(|_| drawing.is_fitted).copied();
+        let (style, fonts, page) = (&drawing.style, &drawing.fonts, drawing.page.clone());
+        let timeline = TopicTimeline::new(&source, &composed.view, style, fonts, page, largest);
         let overview = timeline.overview();
         let rows = by_namespace(rows::of(&source, true), mission.span, false);
         let lives = Timeline::new(&source, rows);

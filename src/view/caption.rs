@@ -9,7 +9,7 @@ use super::state::LivingItems;
 use super::{Frame, Headline, ItemKind, OngoingEvent, Phrase};
 use crate::base::name::{ShortNames, is_quiet};
 use crate::base::rhythm::OVERLAP_NS;
-use crate::base::time::Stamp;
+use crate::base::time::{SECOND, Stamp};
 use crate::base::words;
 use crate::graph::{Element, Elements, NodeId, TopicId, Wiring};
 use crate::mission::Mission;
@@ -195,7 +195,6 @@ impl<'a> CaptionWriter<'a> {
     }
 
     fn moment(&self, at: Stamp) -> String {
-        const SECOND: i64 = 1_000_000_000;
         words::moment(
             at.since(self.start)
                 .div_euclid(SECOND)

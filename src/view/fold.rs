@@ -3,13 +3,13 @@
 //! In come the elements of a mission, the choice of those that are drawn, and the options; out comes the box of each node
 //! and topic. [`Boxes::keys`] is the list of rules in their order, and the place to begin: `roles` (runs of one node), `topics`
 //! (actions, images, transforms), `equal` (robots of a fleet), `alike` (nodes that are there in the same phases),
-//! `namespaces` (collapsed ones). One rule needs the looks of the drawn boxes: `rows` (topics as rows of boxes).
+//! `namespaces` (collapsed ones). One rule needs the looks of the drawn boxes: `box_rows` (topics as rows of boxes).
 
 pub(crate) mod alike;
+pub(crate) mod box_rows;
 pub(crate) mod equal;
 pub(crate) mod namespaces;
 pub(crate) mod roles;
-pub(crate) mod rows;
 pub(crate) mod topics;
 
 use std::collections::{BTreeMap, BTreeSet};

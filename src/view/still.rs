@@ -17,7 +17,7 @@ use crate::base::words;
 use crate::graph::history::Sender;
 use crate::graph::{ById, Element};
 use crate::mission::event_log::{Event, Kind};
-use crate::mission::rates::{Rates, same, steps};
+use crate::mission::rates::{Rates, steps};
 use crate::mission::{EventId, Mission};
 
 /// The times at which a box of a still was there.
@@ -104,13 +104,13 @@ pub(crate) fn union(view: &View) -> Option<SeenWindow> {
 struct StillRates<'a>(Rates<'a>);
 
 impl StillRates<'_> {
-    /// The mean rate of some senders together while they send, and the rates in order if there are several. `hz`, the mean
-    /// of the windows, stays if it is the same.
-    fn rate(&self, senders: &[&Sender], hz: Option<f64>) -> Option<(f64, Vec<f64>)> {
-        let pieces = self.0.of(senders);
-        let mean = self.0.while_sending(senders)?;
-        let hz = hz.filter(|hz| same(*hz, mean)).unwrap_or(mean);
-        Some((hz, steps(&pieces)))
+    /// The mean rate of some senders together while they send, and the rates in order if there are several. Too few
+    /// messages have none, and without any sender it is `hz`, the mean of the windows.
+    fn rate(&self, senders: &[&Sender], hz: Option<f64>) -> (Option<f64>, Vec<f64>) {
+        match self.0.while_sending(senders) {
+            Some(mean) => (Some(mean), steps(&self.0.of(senders))),
+            None => (hz.filter(|_| senders.is_empty()), Vec::new()),
+        }
     }
 
     /// The look of a box or row of a single topic, with its rates.
@@ -119,33 +119,21 @@ impl StillRates<'_> {
             return shown;
         };
         let senders: Vec<&Sender> = self.0.of_topic(*topic);
-        match self.rate(&senders, shown.hz) {
-            Some((hz, steps)) => Shown {
-                hz: Some(hz),
-                steps,
-                ..shown
-            },
-            None => shown,
-        }
+        let (hz, steps) = self.rate(&senders, shown.hz);
+        Shown { hz, steps, ..shown }
     }
 
     /// The look of a line, with the rates of each topic on it.
     fn of_line(&self, arrow: &Arrow, mut shown: Shown) -> Shown {
         for row in &mut shown.topics {
-            let name = arrow.topics.get(row.topic as usize);
-            let edges = self
-                .0
-                .publications(&arrow.members, name.map(|name| &**name));
-            if let Some((hz, steps)) = self.rate(&self.0.senders(&edges), row.hz) {
-                (row.hz, row.steps) = (Some(hz), steps);
-            }
+            let name = arrow.topics.get(row.topic as usize).map(|name| &**name);
+            let edges = self.0.publications(&arrow.members, name);
+            (row.hz, row.steps) = self.rate(&self.0.senders(&edges), row.hz);
         }
         if arrow.kind == ArrowKind::Publish {
             let edges = self.0.publications(&arrow.members, None);
-            if let [_] = edges[..]
-                && let Some((hz, steps)) = self.rate(&self.0.senders(&edges), shown.hz)
-            {
-                (shown.hz, shown.steps) = (Some(hz), steps);
+            if let [_] = edges[..] {
+                (shown.hz, shown.steps) = self.rate(&self.0.senders(&edges), shown.hz);
             }
         }
         shown

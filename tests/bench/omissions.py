@@ -4,8 +4,8 @@
     tests/bench/omissions.py BAGREEL [DATA] [--only NAME]
 
 Draws the examples, and the recordings and graphs in DATA (default: `../shared/data` beside the repository), in both modes, and
-recordings in windows of 10 s, of 60 s and of the default length. Missions that are absent are skipped with a note. Prints a row
-per series of frames, and exits with 1 if a sum is beyond its limit in `LIMITS`:
+recordings in windows of 10 s, of 60 s and of the default length, on pages of the default size and of a README. Missions that are
+absent are skipped with a note. Prints a row per series of frames, and exits with 1 if a sum is beyond its limit in `LIMITS`:
 
     uncoloured  starts, stops and restarts of nodes in headlines without a colour at the node or its words
     nowhere     topics with messages in the window that are no box, row, label, word, or counted with their sender
@@ -31,7 +31,8 @@ from pictures import SVG, points
 
 ROOT = HERE.parent.parent
 MISSIONS = ["inspect/inspect.bag", "mini/mini_lz4.bag", "bags/mission/mission.bag"]
-GRAPHS = [f"graphs/{name}.json" for name in ("medium", "large", "cyclic", "disconnected", "churn")]
+GRAPHS = [f"graphs/{name}.json" for name in ("medium", "large", "huge", "cyclic", "disconnected", "churn")]
+FORMS = {"10 s": ["--period", "10"], "60 s": ["--period", "60"], "README": ["--for", "readme"], "default": []}
 # The share of each defect above which the script fails. Graphs have up to 80 nodes: what changes in them is partly folded.
 DEFECTS = ("uncoloured", "nowhere", "dead", "numbers", "crossed", "heads")
 LIMITS = {
@@ -197,8 +198,9 @@ def measure(file, window, events, sums):
             print(f"    {what} in {file.stem}: {name}", file=sys.stderr)
 
 
-def series(bagreel, mission, mode, period):
+def series(bagreel, mission, mode, form):
     """The sums over the frames of a mission."""
+    period = [option for option in form if option not in FORMS["README"]]
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
         if mission.suffix == ".json":
@@ -207,7 +209,7 @@ def series(bagreel, mission, mode, period):
             mission = folder / mission.name
             mission.write_text(json.dumps(whole))
         render = [bagreel, "render", "-q", mission]
-        subprocess.run([*render, "--mode", mode, *period, "-o", folder / "x{n}.svg"], check=True)
+        subprocess.run([*render, "--mode", mode, *form, "-o", folder / "x{n}.svg"], check=True)
         # Data of a mode contains only what it shows.
         subprocess.run([*render, *period, "-o", folder / "x.json"], check=True)
         data = json.loads((folder / "x.json").read_text())
@@ -240,9 +242,9 @@ def main():
             continue
         kind = "graphs" if mission.suffix == ".json" else "recordings"
         for mode in ("nodes", "all"):
-            for period in ("10", "60", "") if kind == "recordings" else ("",):
-                frames, sums = series(bagreel, mission, mode, ["--period", period] if period else [])
-                row(f"{mission.stem}, {mode}, {period + ' s' if period else 'default'}", frames, sums)
+            for form in ("10 s", "60 s", "README", "default") if kind == "recordings" else ("README", "default"):
+                frames, sums = series(bagreel, mission, mode, FORMS[form])
+                row(f"{mission.stem}, {mode}, {form}", frames, sums)
                 total[kind] += sums
     beyond = []
     for kind, sums in total.items():

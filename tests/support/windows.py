@@ -41,8 +41,8 @@ def split(mission):
 
 
 def join(mission):
-    elements = {}
-    for at, window in enumerate(mission["windows"]):
+    elements, windows = {}, mission["windows"]
+    for at, window in enumerate(windows):
         counts = [topic.get("count") or 0 for topic in window.get("topics", [])]
         window.setdefault("messages", sum(counts))
         ends = [edge for kind in ("publishes", "subscribes") for edge in window.get(kind, [])]
@@ -70,6 +70,10 @@ def join(mission):
             # Without rates, they would be computed from counts.
             if key == "hz" or any(value != DEFAULTS.get(key) for value in column):
                 columns[key] = [[value, len(list(same))] for value, same in itertools.groupby(column)]
+        # Windows do not say when in them the first message came.
+        sent = [windows[at] for at in sorted(there) if there[at].get("count")]
+        if sent:
+            element = {"first_ns": sent[0]["start_ns"], "last_ns": sent[-1]["end_ns"] - 1, **element}
         listed.append({**element, "in": columns})
     return {**mission, "schema": "bagreel.mission/3", "elements": listed}
 

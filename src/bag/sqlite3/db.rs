@@ -8,7 +8,7 @@ use rusqlite::limits::Limit;
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, OpenFlags};
 
-use super::place::{Ready, address};
+use super::ready::{Ready, address};
 
 /// An open database.
 pub(super) struct Db(Connection);

@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use super::place::Ready;
+use super::ready::Ready;
 use super::rows::RowReader;
 use super::{Db, bag};
 use crate::bag::model::{Growing, Growth, OpenOptions, Sink, Want};

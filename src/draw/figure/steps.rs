@@ -61,8 +61,9 @@ fn panel_width(width_mm: f64, span: usize) -> f64 {
     one * span as f64 - BETWEEN
 }
 
-/// The page of these panels, each as high as possible and then as far to the left, with notes of repetitions and omissions.
-/// `left_out` smaller steps have no panel; those that repeat an earlier one are a sentence unless they were asked for.
+/// The page of these panels, each as high as possible, but for a line of text, and then as far to the left, with notes of
+/// repetitions and omissions. `left_out` smaller steps have no panel; those that repeat an earlier one are a sentence unless
+/// they were asked for.
 pub(crate) fn page(sheet: &FigureSheet<'_>, mut panels: Vec<StepPanel>, left_out: usize) -> Scene {
     let width = sheet.options.width_mm;
     let repeated = if sheet.options.steps.is_empty() {
@@ -78,9 +79,10 @@ pub(crate) fn page(sheet: &FigureSheet<'_>, mut panels: Vec<StepPanel>, left_out
             let under = &ends[column..column + panel.span];
             under.iter().copied().fold(0.0, f64::max)
         };
-        let places = 0..=COLUMNS - panel.span.min(COLUMNS);
+        let mut places = 0..=COLUMNS - panel.span.min(COLUMNS);
+        let highest = places.clone().map(end).fold(f64::MAX, f64::min);
         let column = places
-            .min_by(|a, b| end(*a).total_cmp(&end(*b)))
+            .find(|at| end(*at) < highest + canvas.sizes.pitch())
             .unwrap_or(0);
         let left = (width + BETWEEN) / COLUMNS as f64 * column as f64;
         let corner = Point::new(left + 0.1, end(column));

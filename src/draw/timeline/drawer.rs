@@ -137,7 +137,9 @@ pub(crate) fn fitting(names: &[String], most: usize, fits: impl Fn(&str) -> bool
         }
     };
     let most = names.len().min(most);
-    let found = (1..=most).rev().map(text).find(|text| fits(text));
+    // All of them need no number; fewer than that are tried from one on, as there may be thousands.
+    let all = Some(text(most)).filter(|text| fits(text));
+    let found = all.or_else(|| (1..most).map(text).take_while(|text| fits(text)).last());
     found.unwrap_or_else(|| text(most.min(1)))
 }
 
@@ -595,5 +597,28 @@ fn beside(canvas: &mut PaperCanvas<'_>, row: &Row, mut at: Point, mut room: f64)
         canvas.text(at.x, at.y, Type::Small, color, &text);
         let wide = canvas.width(&text, Type::Small) + if text.is_empty() { 0.0 } else { 1.4 };
         (at.x, room) = (at.x + wide, (room - wide).max(0.0));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    #[test]
+    fn names_that_do_not_fit_are_counted_without_trying_each_of_thousands() {
+        let names: Vec<String> = (0..5000).map(|n| format!("/n{n}")).collect();
+        let tries = Cell::new(0);
+        let fits = |text: &str| {
+            tries.set(tries.get() + 1);
+            text.len() <= 20
+        };
+        assert_eq!(fitting(&names, 5000, fits), "/n0, /n1, /n2, +4997");
+        assert!(tries.get() < 10, "{tries:?}");
+        assert_eq!(
+            fitting(&names[..3], 3, |text| text.len() <= 13),
+            "/n0, /n1, /n2"
+        );
+        assert_eq!(fitting(&names[..3], 3, |_| false), "/n0, +2");
     }
 }

@@ -207,9 +207,6 @@ pub(crate) fn read_ros2(context: &mut SourceContext<'_>, record: &LogRecord<'_>)
     });
 }
 
-/// Parts of ROS 2 itself that log below the name of their node.
-const PARTS: &str = "rclcpp rcl rclcpp_action rclcpp_lifecycle tf2_ros";
-
 /// A logger is a part of the nearest node or logger above it, and a node if there is none; the node publishes the log.
 pub(crate) fn conclude_ros2(source: SourceId, known: &mut Conclusions<'_>) {
     let observations = known.observations(source);
@@ -262,7 +259,12 @@ fn owner<'a>(logger: &'a str, nodes: &BTreeSet<Arc<str>>) -> &'a str {
         above = &above[..above.rfind('/').unwrap_or(0)];
     }
     match logger.rsplit_once('/') {
-        Some((node, part)) if !node.is_empty() && PARTS.split(' ').any(|own| own == part) => node,
+        // Parts of ROS 2 itself log below the name of their node.
+        Some((node, "rclcpp" | "rcl" | "rclcpp_action" | "rclcpp_lifecycle" | "tf2_ros"))
+            if !node.is_empty() =>
+        {
+            node
+        }
         _ => generated(logger).unwrap_or(logger),
     }
 }

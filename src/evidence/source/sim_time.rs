@@ -3,8 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::base::time::Stamp;
-use crate::evidence::clock::{DAY, UNSET_DAYS};
+use crate::base::time::{DAY, Stamp};
+use crate::evidence::clock::UNSET_DAYS;
 use crate::evidence::inference::{Conclusions, ElementKey, Reliability};
 use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
 use crate::evidence::message::dynamic::MessageLayout;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::{DiffSubject, Difference, Where};
 use crate::base::notice::Notices;
-use crate::base::time::{Period, Span, Stamp};
+use crate::base::time::{Period, SECOND, Span, Stamp};
 use crate::base::words;
 use crate::draw::timeline::Timeline;
 use crate::draw::timeline::rows::{Level, Row, of_nodes, of_topics};
@@ -31,8 +31,6 @@ pub(crate) enum Side {
     Each,
 }
 
-/// The length of a window of the picture in nanoseconds, without meaning.
-const SECOND: i64 = 1_000_000_000;
 /// The time of all events of the picture, without meaning.
 const AT: Stamp = Stamp(SECOND);
 

@@ -7,8 +7,8 @@ use std::io;
 use crate::base::rhythm::{
     FEWEST, GAP, GAP_NS, PAUSE_FEWEST, PAUSE_MOST, PAUSE_MOST_SHARE, PAUSE_SHARE,
 };
-use crate::base::time::{Span, Stamp};
-use crate::evidence::clock::{DAY, FAR_DAYS};
+use crate::base::time::{DAY, Span, Stamp};
+use crate::evidence::clock::FAR_DAYS;
 use crate::evidence::collector::Recorded;
 use crate::evidence::inference::Stream;
 use crate::evidence::observation::Name;

@@ -54,7 +54,7 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
 /// Adds the changes of nodes' lifecycle states. A node that starts again has none of its earlier states.
 pub(super) fn add_lifecycles(context: &LogInput<'_>, drafts: &mut Drafts) {
     let mut states: BTreeMap<(NodeId, Option<usize>), Arc<str>> = BTreeMap::new();
-    let is_of_windows = context.history.sending.pauses.is_empty();
+    let is_of_windows = !context.history.sending.knows_messages();
     for change in &context.history.transitions {
         let what = Element::Node(change.node);
         let mut lives = context.lives(what).iter();

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::columns::JsonColumns;
 use super::elements::{EdgeJson, ElementJson, NodeJson, TopicJson};
 use super::events::{ChangeRow, InterruptionRow, PhaseRow, events};
-use super::lines::LineFormatter;
+use super::formatter::LineFormatter;
 use super::{SCHEMA, Text};
 use crate::bag::Report;
 use crate::graph::history::Sender;
