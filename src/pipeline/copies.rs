@@ -10,6 +10,7 @@ use crate::bag::straight::{Seam, pass};
 use crate::bag::{self, ConnectionId, Input, Message, OpenOptions, Sink};
 use crate::base::error::Result;
 use crate::base::ids::ById;
+use crate::base::name::is_log;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
@@ -214,8 +215,12 @@ pub(super) fn correct(
 pub(super) fn moved(copies: &mut Copies, shifts: &ById<usize, i64>) {
     for (bag, by) in shifts.with_ids() {
         let spans = copies.grown(bag).values_mut().flatten();
-        spans.for_each(|span| *span = Span::new(span.start.plus(*by), span.end.plus(*by)));
+        spans.for_each(|span| *span = shifted(*span, *by));
     }
+}
+
+fn shifted(span: Span, by: i64) -> Span {
+    Span::new(span.start.plus(by), span.end.plus(by))
 }
 
 /// The messages that are left out: whenever several bags recorded a topic of one robot, those of all but the one with most of them then.
@@ -228,49 +233,56 @@ pub(super) fn copies(
     let pairs: BTreeSet<[usize; 2]> = pairs.iter().map(|pair| [pair.other, pair.bag]).collect();
     let is_pair = |a: usize, b: usize| pairs.contains(&[a.min(b), a.max(b)]);
     let ahead = |bag: usize| shifts.get(bag).copied().unwrap_or(0);
-    let moved = |span: Span, by| Span::new(span.start.plus(by), span.end.plus(by));
-    let spans = spans(recorded);
-    let span = |bag| spans.some(bag).map(|span| moved(*span, ahead(bag)));
-    let mut copies = Copies::default();
-    let all = by_key(recorded);
-    for bags in all.values().filter(|_| !pairs.is_empty()) {
-        let streams = |bag: usize| bags[&bag].iter().map(|at| &recorded.streams[*at]);
-        // The bags whose recording begins or ends at a time.
+    let mut spans = spans(recorded);
+    for (bag, by) in shifts.with_ids() {
+        let span = spans.grown(bag).iter_mut();
+        span.for_each(|span| *span = shifted(*span, *by));
+    }
+    let (times, mut copies) = (&recorded.messages, Copies::default());
+    for bags in by_key(recorded).values().filter(|_| !pairs.is_empty()) {
+        // At which times recordings begin or end, and whose.
         let mut edges: BTreeMap<Stamp, Vec<usize>> = BTreeMap::new();
-        for (bag, span) in bags.keys().filter_map(|bag| Some((*bag, span(*bag)?))) {
-            edges.entry(span.start).or_default().push(bag);
-            edges.entry(span.end).or_default().push(bag);
-        }
-        let mut here = BTreeSet::new();
-        let mut edges = edges.into_iter().peekable();
-        while let Some((start, changed)) = edges.next() {
-            for bag in changed {
-                if !here.remove(&bag) {
-                    here.insert(bag);
-                }
+        for bag in bags.keys() {
+            for edge in spans
+                .some(*bag)
+                .map_or([Stamp::MIN; 2], |s| [s.start, s.end])
+            {
+                edges.entry(edge).or_default().push(*bag);
             }
-            let is_twice = |bag: &&usize| here.iter().any(|other| is_pair(**bag, *other));
-            let Some((end, _)) = edges.peek() else { break };
-            let part = Span::new(start, *end);
+        }
+        // Log records are, and each is another one.
+        let is_latched = |s: &Stream| s.latched && !is_log(s.connection.topic.as_str());
+        let mut here = BTreeSet::new();
+        let ends: Vec<Stamp> = edges.keys().skip(1).copied().collect();
+        for ((start, changed), end) in edges.into_iter().zip(ends) {
+            let ended: Vec<usize> = changed
+                .iter()
+                .filter(|bag| here.contains(*bag))
+                .copied()
+                .collect();
+            here.extend(changed);
+            here.retain(|bag| !ended.contains(bag));
+            let part = Span::new(start, end);
             let mut ranked = Vec::new();
-            for bag in here.iter().filter(is_twice) {
-                let own = moved(part, -ahead(*bag));
-                let many = streams(*bag).map(|s| recorded.messages.count_in(s.times, own));
-                let many = many.sum::<io::Result<u64>>().map_err(spool_error)?;
-                let whole: u64 = streams(*bag)
-                    .map(|s| recorded.messages.count(s.times))
-                    .sum();
+            for bag in here
+                .iter()
+                .filter(|bag| here.iter().any(|other| is_pair(**bag, *other)))
+            {
+                let own = shifted(part, -ahead(*bag));
+                let streams = || bags[bag].iter().map(|at| &recorded.streams[*at]);
+                let many = streams().map(|s| times.count_in(s.times, own));
+                let many: u64 = many.sum::<io::Result<_>>().map_err(spool_error)?;
+                let whole: u64 = streams().map(|s| times.count(s.times)).sum();
                 // Of a latched topic the first message counts, as it was there before.
-                let bounds = streams(*bag).filter_map(|s| recorded.messages.bounds(s.times));
-                let first = bounds.map(|(first, _)| first.plus(ahead(*bag))).min();
-                let first = first.filter(|_| streams(*bag).all(|stream| stream.latched));
+                let first = streams()
+                    .filter_map(|s| Some(times.bounds(s.times)?.0))
+                    .min();
+                let first = first.filter(|_| streams().all(is_latched));
                 ranked.push((first, many, Reverse(whole), *bag));
             }
-            // One message more or less at each edge shows no loss.
+            // One message more or less shows no loss: at an edge it may be recorded by one only.
             let most = ranked.iter().map(|of| of.1).max().unwrap_or(0);
-            ranked.sort_unstable_by_key(|(first, many, whole, bag)| {
-                (*first, many + 2 < most, *whole, *bag)
-            });
+            ranked.sort_unstable_by_key(|of| (of.1 + 1 < most, of.0, of.2, of.3));
             let mut kept: Vec<usize> = Vec::new();
             for (.., bag) in ranked {
                 let Some(better) = kept.iter().find(|other| is_pair(**other, bag)) else {
@@ -278,16 +290,16 @@ pub(super) fn copies(
                     continue;
                 };
                 // At the edges of a recording its messages may be recorded a little sooner or later.
-                let edge =
-                    |of: fn(Span) -> Stamp| span(*better).is_some_and(|span| of(span) == of(part));
+                let near = |edge| {
+                    let own = spans.some(*better).map(|span| [span.start, span.end]);
+                    i64::from(own.is_some_and(|own| own.contains(&edge))) * NEAR_NS
+                };
                 let covered = Span::new(
-                    part.start
-                        .plus(if edge(|span| span.start) { -NEAR_NS } else { 0 }),
-                    part.end
-                        .plus(if edge(|span| span.end) { NEAR_NS } else { 0 }),
+                    part.start.plus(-near(part.start)),
+                    part.end.plus(near(part.end)),
                 );
-                for stream in streams(bag) {
-                    let of_bag = copies.grown(bag).entry(stream.connection.id);
+                for at in &bags[&bag] {
+                    let of_bag = copies.grown(bag).entry(recorded.streams[*at].connection.id);
                     of_bag.or_default().push(covered);
                 }
             }

@@ -147,24 +147,9 @@ fn own_config(source: SourceId, known: &mut Conclusions<'_>, node: Name, topic: 
 // publisher is known. For example, `/move_base/status` is by `/move_base`, and `/nav/costmap` by the node of that name.
 
 /// Beginnings of the last part of names that others publish: goals for an action, commands for a controller.
-const TAKEN: [&str; 16] = [
-    "goal",
-    "cancel",
-    "cmd",
-    "command",
-    "set",
-    "input",
-    "target",
-    "desired",
-    "reference",
-    "request",
-    "trigger",
-    "enable",
-    "disable",
-    "reset",
-    "joint_trajectory",
-    "sub_",
-];
+const TAKEN: &str = "\
+    goal cancel cmd command set input target desired reference request trigger enable disable reset \
+    joint_trajectory sub_";
 
 pub(crate) fn private_name(source: SourceId, known: &mut Conclusions<'_>) {
     let nodes: NodesByName = known.nodes().iter().map(|n| (known.text(*n), *n)).collect();
@@ -172,7 +157,7 @@ pub(crate) fn private_name(source: SourceId, known: &mut Conclusions<'_>) {
     for topic in known.topics_of(|_| true) {
         let name = known.text(topic);
         let last = name.rsplit('/').next().unwrap_or_default();
-        let is_taken = TAKEN.iter().any(|taken| last.starts_with(taken));
+        let is_taken = TAKEN.split(' ').any(|taken| last.starts_with(taken));
         // As those of actions and of service introspection are.
         let is_hidden = name.split('/').any(|part| part.starts_with('_'));
         let is_other = is_taken || is_hidden || is_log(&name);

@@ -347,10 +347,13 @@ fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
     let ([lower, median, upper], usual) = quartiles(times, 1);
     let is_even = times.len() > FEWEST_INTERVALS && upper as f64 <= EVEN * lower.max(1) as f64;
     let is_many = times.len() > 4 * FEWEST_INTERVALS;
-    // By a coarse clock, single intervals are long or short, and their sums are even.
+    // By a coarse clock, single intervals are long or short, and their sums are even, all but one tick.
     let uneven = if is_many && !is_even { times } else { &[] };
     let ([low, _, up], of_two) = quartiles(uneven, 2);
-    let is_even = is_even || are_lost(uneven, lower, median, upper);
+    let ([few, _, many], _) = quartiles(uneven, 8);
+    // If less than half of the messages were lost, most intervals are one period, and sums scatter by several.
+    let is_scattered = lower > TICK_NS || (many - few) / 3 > (upper - lower) / 2;
+    let is_even = is_even || is_many && lower > 0 && median - lower <= lower / 4 && is_scattered;
     let are_sums_even = low > 0 && up as f64 <= EVEN_OF_TWO * low as f64 && upper <= lower * 3;
     Some(Stretch {
         first,
@@ -365,25 +368,6 @@ fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
         is_even: is_even || are_sums_even,
         is_joined,
     })
-}
-
-/// Whether less than half of the messages were lost between these, as their intervals with these quartiles show: most are whole periods,
-/// and too long for the tick of a coarse clock, or sums of four scatter by more than one tick.
-fn are_lost(times: &[Stamp], lower: i64, median: i64, upper: i64) -> bool {
-    let sums = times.iter().zip(times.iter().skip(4));
-    let mut sums: Vec<i64> = sums.map(|(a, b)| b.since(*a)).collect();
-    sums.sort_unstable();
-    let Some((low, high)) = sums.get(sums.len() / 10).zip(sums.get(sums.len() * 9 / 10)) else {
-        return false;
-    };
-    let quarter = lower / 4;
-    let is_off = |t: &&[Stamp]| {
-        let part = t[1].since(t[0]).rem_euclid(lower.max(1));
-        (quarter..lower - quarter).contains(&part)
-    };
-    let off = times.windows(2).filter(is_off).count();
-    let is_scattered = lower > TICK_NS || (high - low) / 3 > (upper - lower) / 2;
-    is_scattered && lower > 0 && median - lower <= quarter && off * 10 <= times.len()
 }
 
 /// The quartiles of the sums of so many intervals, and the usual sum: of intervals about as long as the median, and exactly the mean of

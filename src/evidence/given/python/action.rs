@@ -4,6 +4,12 @@ use super::super::tree::Tree;
 use super::PythonValue::{self, Action, Dict, Function, List, Text, Unknown};
 use super::{Arguments, Evaluator, UNREAD};
 
+/// Actions that start no node and change no name.
+const OTHER: &str = "\
+    AppendEnvironmentVariable EmitEvent ExecuteLocal ExecuteProcess LogInfo ResetEnvironment \
+    SetEnvironmentVariable SetParameter SetParametersFromFile SetROSLogDir SetUseSimTime Shutdown \
+    UnsetEnvironmentVariable UnsetLaunchConfiguration";
+
 impl Evaluator<'_> {
     /// The action that a call creates, if any.
     pub(super) fn action(&mut self, name: &str, arguments: &Arguments) -> Option<PythonValue> {
@@ -101,21 +107,7 @@ fn tree(name: &str, given: &Arguments) -> Option<Tree> {
             let condition = format!("$(eval '$(var {variable})' {sign} '{value}')");
             element("condition", &[("if", Some(condition))])
         }
-        // They start no node and change no name.
-        "AppendEnvironmentVariable"
-        | "EmitEvent"
-        | "ExecuteLocal"
-        | "ExecuteProcess"
-        | "LogInfo"
-        | "ResetEnvironment"
-        | "SetEnvironmentVariable"
-        | "SetParameter"
-        | "SetParametersFromFile"
-        | "SetROSLogDir"
-        | "SetUseSimTime"
-        | "Shutdown"
-        | "UnsetEnvironmentVariable"
-        | "UnsetLaunchConfiguration" => element("other", &[]),
+        other if OTHER.split(' ').any(|name| name == other) => element("other", &[]),
         _ => return None,
     };
     match name {
