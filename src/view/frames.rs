@@ -839,9 +839,7 @@ mod tests {
         let hz = |window: &str| {
             let (view, _) = view(&mission(&[window]), &ViewOptions::default());
             let seen = view.seen(0).arrows;
-            seen.iter()
-                .map(|arrow| arrow.hz.map(libm::round))
-                .collect::<Vec<_>>()
+            seen.iter().map(|arrow| arrow.hz).collect::<Vec<_>>()
         };
         assert_eq!(hz("=/t@63 /a>/t"), [Some(63.0)]);
         assert_eq!(hz("=/t@63 /a>/t /b>/t"), [None, None]);

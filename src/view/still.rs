@@ -17,7 +17,7 @@ use crate::base::words;
 use crate::graph::history::Sender;
 use crate::graph::{ById, Element};
 use crate::mission::event_log::{Event, Kind};
-use crate::mission::rates::{Rates, steps};
+use crate::mission::rates::{Rates, same, steps};
 use crate::mission::{EventId, Mission};
 
 /// The times at which a box of a still was there.
@@ -105,10 +105,13 @@ struct StillRates<'a>(Rates<'a>);
 
 impl StillRates<'_> {
     /// The mean rate of some senders together while they send, and the rates in order if there are several. Too few
-    /// messages have none, and without any sender it is `hz`, the mean of the windows.
+    /// messages have none. `hz`, the mean of the windows, stays if it is the same, or without any sender.
     fn rate(&self, senders: &[&Sender], hz: Option<f64>) -> (Option<f64>, Vec<f64>) {
         match self.0.while_sending(senders) {
-            Some(mean) => (Some(mean), steps(&self.0.of(senders))),
+            Some(mean) => {
+                let hz = hz.filter(|hz| same(*hz, mean)).unwrap_or(mean);
+                (Some(hz), steps(&self.0.of(senders)))
+            }
             None => (hz.filter(|_| senders.is_empty()), Vec::new()),
         }
     }
