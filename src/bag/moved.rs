@@ -17,10 +17,6 @@ impl Moved {
     }
 }
 
-fn moved(span: Span, by: i64) -> Span {
-    Span::new(span.start.plus(by), span.end.plus(by))
-}
-
 impl Reader for Moved {
     fn is_straight(&self) -> bool {
         self.reader.is_straight()
@@ -28,11 +24,11 @@ impl Reader for Moved {
 
     fn span(&mut self) -> Result<Option<Span>> {
         let span = self.reader.span()?;
-        Ok(span.map(|span| moved(span, self.by)))
+        Ok(span.map(|span| span.moved(self.by)))
     }
 
     fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
-        let range = range.map(|range| moved(range, self.by.saturating_neg()));
+        let range = range.map(|range| range.moved(self.by.saturating_neg()));
         self.reader
             .read(range, &mut MovedSink { sink, by: self.by })
     }
@@ -90,7 +86,7 @@ mod tests {
     fn span_range_and_messages_are_moved_alike() {
         let (span, (first, last)) = ends(0, None);
         let (at, (from, to)) = ends(5, None);
-        assert_eq!(at, span.map(|span| moved(span, 5)));
+        assert_eq!(at, span.map(|span| span.moved(5)));
         assert_eq!((from, to), (first.plus(5), last.plus(5)));
         let only = Span::new(first.plus(5), first.plus(6));
         assert_eq!(ends(5, Some(only)).1, (first.plus(5), first.plus(5)));

@@ -105,6 +105,11 @@ impl Span {
         self.end.min(other.end).since(self.start.max(other.start))
     }
 
+    /// The interval this many nanoseconds later.
+    pub(crate) fn moved(self, by: i64) -> Self {
+        Self::new(self.start.plus(by), self.end.plus(by))
+    }
+
     /// The shortest interval that contains both.
     pub(crate) fn hull(&self, other: Self) -> Self {
         Self::new(self.start.min(other.start), self.end.max(other.end))

@@ -268,6 +268,7 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
     let of = (0..streams.len()).filter(|at| !streams[*at].latched);
     for of in contents(streams, facts, of) {
         let of = of?;
+        let once = once.entry(of.topic).or_default();
         for same in of.messages.chunk_by(|a, b| a.0 == b.0) {
             // What a bag contains more often is a constant.
             let mut times: BTreeMap<usize, Option<Stamp>> = BTreeMap::new();
@@ -278,11 +279,8 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
             let times = times.into_iter();
             let times = times.filter_map(|(bag, time)| Some((bag, time?)));
             let times: Vec<(usize, Stamp)> = times.collect();
-            for (bag, time) in &times {
-                let of_topic = once.entry(of.topic).or_default();
-                of_topic.entry(*bag).or_default().push(*time);
-            }
             for (at, (bag, time)) in times.iter().enumerate() {
+                once.entry(*bag).or_default().push(*time);
                 for (other, before) in &times[..at] {
                     let is = [of.stamped, time.min(before).0 > UNSET_DAYS * DAY];
                     let lags = lags.entry([*bag, *other]).or_default();

@@ -215,12 +215,32 @@ pub(super) fn correct(
 pub(super) fn moved(copies: &mut Copies, shifts: &ById<usize, i64>) {
     for (bag, by) in shifts.with_ids() {
         let spans = copies.grown(bag).values_mut().flatten();
-        spans.for_each(|span| *span = shifted(*span, *by));
+        spans.for_each(|span| *span = span.moved(*by));
     }
 }
 
-fn shifted(span: Span, by: i64) -> Span {
-    Span::new(span.start.plus(by), span.end.plus(by))
+/// The times between which the same of some bags were recording, with these bags; `spans`: the times that each bag covers.
+fn parts<'a>(
+    bags: impl Iterator<Item = &'a usize>,
+    spans: &ById<usize, Option<Span>>,
+) -> Vec<(Span, BTreeSet<usize>)> {
+    // Those that begin or end at each time.
+    let mut changes: BTreeMap<Stamp, BTreeSet<usize>> = BTreeMap::new();
+    for (bag, span) in bags.filter_map(|bag| Some((*bag, spans.some(*bag)?))) {
+        for edge in [span.start, span.end] {
+            changes.entry(edge).or_default().insert(bag);
+        }
+    }
+    let ends: Vec<Stamp> = changes.keys().skip(1).copied().collect();
+    let mut here = BTreeSet::new();
+    let parts = changes
+        .into_iter()
+        .zip(ends)
+        .map(|((start, changed), end)| {
+            here = &here ^ &changed;
+            (Span::new(start, end), here.clone())
+        });
+    parts.collect()
 }
 
 /// The messages that are left out: whenever several bags recorded a topic of one robot, those of all but the one with most of them then.
@@ -230,76 +250,55 @@ pub(super) fn copies(
     pairs: &[ClockOffset],
     shifts: &ById<usize, i64>,
 ) -> Result<Copies> {
+    let mut copies = Copies::default();
+    if pairs.is_empty() {
+        return Ok(copies);
+    }
     let pairs: BTreeSet<[usize; 2]> = pairs.iter().map(|pair| [pair.other, pair.bag]).collect();
     let is_pair = |a: usize, b: usize| pairs.contains(&[a.min(b), a.max(b)]);
-    let ahead = |bag: usize| shifts.get(bag).copied().unwrap_or(0);
     let mut spans = spans(recorded);
     for (bag, by) in shifts.with_ids() {
         let span = spans.grown(bag).iter_mut();
-        span.for_each(|span| *span = shifted(*span, *by));
+        span.for_each(|span| *span = span.moved(*by));
     }
-    let (times, mut copies) = (&recorded.messages, Copies::default());
-    for bags in by_key(recorded).values().filter(|_| !pairs.is_empty()) {
-        // At which times recordings begin or end, and whose.
-        let mut edges: BTreeMap<Stamp, Vec<usize>> = BTreeMap::new();
-        for bag in bags.keys() {
-            for edge in spans
-                .some(*bag)
-                .map_or([Stamp::MIN; 2], |s| [s.start, s.end])
-            {
-                edges.entry(edge).or_default().push(*bag);
-            }
-        }
-        // Log records are, and each is another one.
-        let is_latched = |s: &Stream| s.latched && !is_log(s.connection.topic.as_str());
-        let mut here = BTreeSet::new();
-        let ends: Vec<Stamp> = edges.keys().skip(1).copied().collect();
-        for ((start, changed), end) in edges.into_iter().zip(ends) {
-            let ended: Vec<usize> = changed
-                .iter()
-                .filter(|bag| here.contains(*bag))
-                .copied()
-                .collect();
-            here.extend(changed);
-            here.retain(|bag| !ended.contains(bag));
-            let part = Span::new(start, end);
-            let mut ranked = Vec::new();
-            for bag in here
-                .iter()
-                .filter(|bag| here.iter().any(|other| is_pair(**bag, *other)))
-            {
-                let own = shifted(part, -ahead(*bag));
-                let streams = || bags[bag].iter().map(|at| &recorded.streams[*at]);
-                let many = streams().map(|s| times.count_in(s.times, own));
-                let many: u64 = many.sum::<io::Result<_>>().map_err(spool_error)?;
-                let whole: u64 = streams().map(|s| times.count(s.times)).sum();
-                // Of a latched topic the first message counts, as it was there before.
-                let first = streams()
-                    .filter_map(|s| Some(times.bounds(s.times)?.0))
-                    .min();
-                let first = first.filter(|_| streams().all(is_latched));
-                ranked.push((first, many, Reverse(whole), *bag));
-            }
+    // Log records are, and each is another one.
+    let is_latched = |s: &Stream| s.latched && !is_log(s.connection.topic.as_str());
+    let times = &recorded.messages;
+    for bags in by_key(recorded).values() {
+        let streams = |bag: usize| bags[&bag].iter().map(|at| &recorded.streams[*at]);
+        // Of a latched topic the first message counts, as it was there before.
+        let order = |bag: usize| {
+            let first = streams(bag).filter_map(|s| Some(times.bounds(s.times)?.0));
+            let first = first.min().filter(|_| streams(bag).all(is_latched));
+            let count: u64 = streams(bag).map(|s| times.count(s.times)).sum();
+            (first, Reverse(count), bag)
+        };
+        for (part, here) in parts(bags.keys(), &spans) {
+            let is_twice = |bag: &usize| here.iter().any(|other| is_pair(*bag, *other));
+            let count = |bag: usize| {
+                let own = part.moved(-shifts.get(bag).copied().unwrap_or(0));
+                let counts = streams(bag).map(|s| times.count_in(s.times, own));
+                Ok((bag, counts.sum::<io::Result<u64>>()?))
+            };
+            let counts = here.iter().copied().filter(is_twice).map(count);
+            let mut counts: Vec<(usize, u64)> =
+                counts.collect::<io::Result<_>>().map_err(spool_error)?;
             // One message more or less shows no loss: at an edge it may be recorded by one only.
-            let most = ranked.iter().map(|of| of.1).max().unwrap_or(0);
-            ranked.sort_unstable_by_key(|of| (of.1 + 1 < most, of.0, of.2, of.3));
+            let most = counts.iter().map(|of| of.1).max().unwrap_or(0);
+            counts.sort_by_cached_key(|(bag, count)| (count + 1 < most, order(*bag)));
             let mut kept: Vec<usize> = Vec::new();
-            for (.., bag) in ranked {
-                let Some(better) = kept.iter().find(|other| is_pair(**other, bag)) else {
+            for (bag, _) in counts {
+                let better = kept.iter().find(|other| is_pair(**other, bag));
+                let Some(own) = better.and_then(|better| spans.some(*better)) else {
                     kept.push(bag);
                     continue;
                 };
                 // At the edges of a recording its messages may be recorded a little sooner or later.
-                let near = |edge| {
-                    let own = spans.some(*better).map(|span| [span.start, span.end]);
-                    i64::from(own.is_some_and(|own| own.contains(&edge))) * NEAR_NS
-                };
-                let covered = Span::new(
-                    part.start.plus(-near(part.start)),
-                    part.end.plus(near(part.end)),
-                );
-                for at in &bags[&bag] {
-                    let of_bag = copies.grown(bag).entry(recorded.streams[*at].connection.id);
+                let near = |is_edge| if is_edge { NEAR_NS } else { 0 };
+                let start = part.start.plus(-near(part.start == own.start));
+                let covered = Span::new(start, part.end.plus(near(part.end == own.end)));
+                for stream in streams(bag) {
+                    let of_bag = copies.grown(bag).entry(stream.connection.id);
                     of_bag.or_default().push(covered);
                 }
             }
