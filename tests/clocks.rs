@@ -95,6 +95,17 @@ impl Healthy {
         copy
     }
 
+    /// A copy without this percentage of the messages.
+    fn lossy(&self, percent: u64) -> Recording {
+        let mut dice = 2_463_534_242 + percent;
+        self.copy(|_, at| {
+            dice = dice
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            ((dice >> 33) % 100 >= percent).then_some(at)
+        })
+    }
+
     /// The recording of another robot, with other contents but on the topics that both read, this much later.
     fn another(&self, later: i64, read: &[&str]) -> Recording {
         let mut copy = self.copy(|_, at| Some(at + later));
@@ -192,15 +203,6 @@ fn clock_faults_are_attributed_to_the_recorder() {
             .iter()
             .any(|hole| (*hole..*hole + 3 * SECOND).contains(&at))
     };
-    let loses = |percent: u64| {
-        let mut dice = 2_463_534_242 + percent;
-        healthy.copy(|_, at| {
-            dice = dice
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            ((dice >> 33) % 100 >= percent).then_some(at)
-        })
-    };
     let first = |at: i64, topic: &str| healthy.is_first(topic).then_some(at);
     let second = |at: i64, topic: &str| (!healthy.is_first(topic)).then_some(at);
     let all = [
@@ -209,9 +211,9 @@ fn clock_faults_are_attributed_to_the_recorder() {
             "without /rosout_agg",
             vec![healthy.copy(|topic, at| (topic != "/rosout_agg").then_some(at))],
         ),
-        ("3 % lost", vec![loses(3)]),
-        ("10 % lost", vec![loses(10)]),
-        ("30 % lost", vec![loses(30)]),
+        ("3 % lost", vec![healthy.lossy(3)]),
+        ("10 % lost", vec![healthy.lossy(10)]),
+        ("30 % lost", vec![healthy.lossy(30)]),
         (
             "three times 3 s not recorded",
             vec![healthy.copy(|_, at| (!in_hole(at)).then_some(at))],
@@ -364,17 +366,9 @@ fn two_robots_that_receive_the_same_of_their_fleet_are_two() {
 #[test]
 fn what_one_recorder_loses_is_taken_from_the_other() {
     let healthy = Healthy::new();
-    let mut dice = 7_u64;
-    let mut loses = |percent: u64| {
-        dice = dice
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (dice >> 33) % 100 < percent
-    };
-    let lossy = healthy.copy(|_, at| (!loses(25)).then_some(at));
     let end = healthy.length / 10 * 7;
     let complete = healthy.copy(|_, at| (at < end).then_some(at + 800_000_000 + at % 5_000_000));
-    let both = mission(&[lossy, complete], |_, _| {});
+    let both = mission(&[healthy.lossy(25), complete], |_, _| {});
     let alone = mission(&[healthy.copy(|_, at| Some(at))], |_, _| {});
     // A silence, and since when a topic is received, may be known by a lost message only.
     let certain = |mission: &Mission| {

@@ -452,18 +452,23 @@ mod tests {
         assert_eq!(reported(&[(100_000, 10)]).len(), 1);
     }
 
+    /// These times without this percentage of them from the place `from` on.
+    fn without(all: &[Stamp], from: usize, percent: u64, seed: u64) -> Vec<Stamp> {
+        let mut dice = seed;
+        let kept = all.iter().enumerate().filter(|(at, _)| {
+            dice = dice
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_041);
+            *at < from || (dice >> 33) % 100 >= percent
+        });
+        kept.map(|(_, time)| *time).collect()
+    }
+
     #[test]
     fn lost_messages_are_not_a_rate_change() {
         let all = times(&[(300, 500)]);
-        for seed in 0..20_u64 {
-            let mut dice = seed;
-            let kept = all.iter().copied().filter(|_| {
-                dice = dice
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1_442_695_041);
-                (dice >> 33) % 100 >= 30
-            });
-            let kept: Vec<Stamp> = kept.collect();
+        for seed in 0..20 {
+            let kept = without(&all, 0, 30, seed);
             let joined = stretches(&kept).iter().filter(|s| s.is_joined).count();
             assert_eq!(joined, 0, "seed {seed}");
         }
@@ -473,16 +478,8 @@ mod tests {
     fn messages_lost_from_a_moment_on_change_no_rate() {
         for (loss, hz) in [(20, 2), (25, 10), (30, 4), (35, 20)] {
             let all = times(&[(1200, 1000 / hz)]);
-            for seed in 0..20_u64 {
-                let mut dice = seed;
-                let kept = all.iter().copied().enumerate().filter(|(at, _)| {
-                    dice = dice
-                        .wrapping_mul(6_364_136_223_846_793_005)
-                        .wrapping_add(1_442_695_041);
-                    *at < 600 || (dice >> 33) % 100 >= loss
-                });
-                let kept: Vec<Stamp> = kept.map(|(_, time)| time).collect();
-                let found = stretches(&kept);
+            for seed in 0..20 {
+                let found = stretches(&without(&all, 600, loss, seed));
                 let same = found.iter().all(|s| is_same(s, &found[0]) && !s.is_joined);
                 assert!(same, "{loss} {hz} {seed} {found:?}");
             }
