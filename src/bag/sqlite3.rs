@@ -320,16 +320,14 @@ impl Sqlite3Bag {
     }
 }
 
-/// Whether the table of messages is empty, but not the index of their times: its first page is damaged.
-const LOST: &str = "SELECT (SELECT rowid FROM messages NOT INDEXED LIMIT 1) IS NULL \
-                    AND (SELECT timestamp FROM messages ORDER BY timestamp LIMIT 1) IS NOT NULL";
-
 /// Has SQLite check the whole file for damage, and the index of times against the rows.
 fn check(db: &Db, sink: &mut dyn Sink) {
     let found = db.first("PRAGMA integrity_check(1)", &[], |row| row.text(0));
     let result = found.map_or_else(|e| e.to_string(), Option::unwrap_or_default);
     if result != "ok" {
-        damaged(sink, 1, &format!("the database is damaged: {result}"));
+        // A first line names the database only.
+        let fault = result.lines().last().unwrap_or_default();
+        damaged(sink, 1, &format!("the database is damaged: {fault}"));
     }
 }
 
@@ -354,13 +352,15 @@ impl Reader for Sqlite3Bag {
         self.notices.iter().for_each(|n| clip.notice(n.clone()));
         let db = Db::open(&self.ready).map_err(|e| broken(&self.path, &e))?;
         let mut tier = Tier::Index;
-        if self.verify {
+        // SQLite returns no rows where the first page of a table lost its entries.
+        let any = "SELECT rowid FROM messages NOT INDEXED LIMIT 1";
+        let is_empty = matches!(db.first(any, &[], |row| row.integer(0)), Ok(None));
+        if self.verify || is_empty {
             check(&db, &mut clip);
+        }
+        if self.verify {
             tier = Tier::Verify;
         }
-        let is_lost = matches!(db.first(LOST, &[], |row| row.integer(0)), Ok(Some(1)));
-        let text = "the table of messages has no rows, but the index of their times does";
-        damaged(&mut clip, u64::from(is_lost), text);
         let rows = RowReader::new(self, &wants, range);
         let parts = self.parts(&db, range);
         drop(db);

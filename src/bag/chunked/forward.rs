@@ -100,6 +100,8 @@ pub(super) struct Walk<G> {
     compression: BTreeSet<Compression>,
     allowance: Arc<Allowance>,
     account: Account,
+    /// Whether a record was found: even a bag that was never closed has its head.
+    begun: bool,
     /// Whether the end of the data was reached, and the record that ends the file.
     ended: bool,
     closed: bool,
@@ -197,12 +199,15 @@ impl<G: Grammar> Walk<G> {
         let walk = forward.walk;
         let is_cut = !matches!(stop, NoRecord::Io(_));
         let text = match stop {
-            NoRecord::End if !G::HAS_END => return self.compression,
+            NoRecord::End if !G::HAS_END && walk.begun => return self.compression,
             _ if walk.closed && is_cut => return self.compression,
             _ if walk.ended && is_cut => {
                 format!("the bag is cut at byte {at}, behind its messages")
             }
-            NoRecord::End => format!("the bag was never finished; it ends at byte {at}"),
+            NoRecord::End if walk.begun => {
+                format!("the bag was never finished; it ends at byte {at}")
+            }
+            NoRecord::End => format!("the bag ends at byte {at}, before its first record"),
             NoRecord::Cut => format!("the bag is cut at byte {at}"),
             NoRecord::Broken => format!("no record at byte {at}"),
             NoRecord::Io(e) => format!("reading stopped at byte {at}: {e}"),
@@ -225,6 +230,7 @@ impl<G: Grammar> Forward<'_, G> {
         from: u64,
         record: RecordHead<G::Description>,
     ) -> Result<(), NoRecord> {
+        self.walk.begun = true;
         let is_content = matches!(record, RecordHead::Chunk(_) | RecordHead::Message { .. });
         if self.walk.ended && is_content {
             self.walk.ended = false;
