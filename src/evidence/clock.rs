@@ -184,6 +184,8 @@ const SHARE: usize = 80;
 /// The largest difference between the offsets of two messages, in nanoseconds: they take different paths to
 /// the recorders, over a network within some ten milliseconds. Smaller offsets than this do not change a window.
 pub(crate) const NEAR_NS: i64 = 50_000_000;
+/// The most recorders that run at once: what more bags contain is a constant that a node sends whenever the recording is split.
+const RECORDERS: usize = 8;
 /// The longest time after which a merged recording repeats a message, in nanoseconds: a simulation that is set back repeats its messages
 /// later, and the clocks of most computers are less apart.
 const MERGED_NS: i64 = 5_000_000_000;
@@ -278,7 +280,10 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
             }
             let times = times.into_iter();
             let times = times.filter_map(|(bag, time)| Some((bag, time?)));
-            let times: Vec<(usize, Stamp)> = times.collect();
+            let mut times: Vec<(usize, Stamp)> = times.collect();
+            if times.len() > RECORDERS {
+                times.clear();
+            }
             for (at, (bag, time)) in times.iter().enumerate() {
                 once.entry(*bag).or_default().push(*time);
                 for (other, before) in &times[..at] {
@@ -292,12 +297,12 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
     // No other run has a node with the time of its start in its name.
     let started = streams.iter().filter_map(|stream| {
         let name = stream.connection.publisher.as_ref()?.as_str();
-        start(name).map(|_| (name, stream.bag))
+        start(name).map(|_| (stream.bag, name))
     });
-    let started: BTreeSet<(&str, usize)> = started.collect();
+    let started: BTreeSet<(usize, &str)> = started.collect();
     let is_one_run = |[one, other]: [usize; 2]| {
-        let mut all = started.iter().filter(|(_, bag)| *bag == one);
-        all.any(|(name, _)| started.contains(&(name, other)))
+        let mut all = started.range((one, "")..(one + 1, ""));
+        all.any(|(_, name)| started.contains(&(other, name)))
     };
     let all = lags.into_iter();
     let found = all.filter_map(|(bags, lags)| offset(bags, lags, &once, is_one_run(bags)));

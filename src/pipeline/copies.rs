@@ -21,6 +21,8 @@ use crate::evidence::observation::Name;
 
 /// The time that is compared in large bags, whose payloads are not read, in nanoseconds: messages of slow topics are in it, too.
 const SAMPLE_NS: i64 = 10_000_000_000;
+/// The most pairs of files that are compared for two split recordings: there may be one in which little was sent.
+const SAMPLES: usize = 3;
 
 /// The messages that are left out since another bag, or the same, contains them: by bag and connection, their times, sorted; an interval
 /// without length is the second message at its time.
@@ -56,33 +58,53 @@ pub(super) fn pairs(
     let mut pairs: Vec<ClockOffset> = recorded.offsets.iter().filter(is_one).copied().collect();
     let is_unread =
         |at: &usize| !recorded.streams[*at].latched && recorded.facts.payloads.some(*at).is_none();
-    let mut common: BTreeSet<[usize; 2]> = BTreeSet::new();
-    for bags in by_key(recorded).values() {
-        for (bag, _) in bags.iter().filter(|(_, own)| own.iter().any(is_unread)) {
-            let others = bags.keys().filter(|other| *other != bag);
-            common.extend(others.map(|other| [*bag.min(other), *bag.max(other)]));
+    let known: BTreeSet<[usize; 2]> = pairs.iter().map(|pair| [pair.other, pair.bag]).collect();
+    let mut part = vec![0; inputs.len()];
+    for (at, bags) in parts.iter().enumerate() {
+        for bag in bags {
+            part[*bag] = at;
         }
     }
-    let is_known = |bags: &[usize; 2]| {
-        let of = |pair: &ClockOffset| [pair.other, pair.bag] == *bags;
-        pairs.iter().any(of) || bags.iter().any(|bag| inputs[*bag].is_pipe())
-    };
-    common.retain(|bags| !is_known(bags));
+    let spans = spans(recorded);
     // Small bags are read whole, of large ones the time that two of them share.
-    let samples = if affordable(reading).payload_bytes > 0 {
-        let bags: BTreeSet<usize> = common.into_iter().flatten().collect();
-        vec![(bags.into_iter().collect(), None)]
-    } else {
-        let spans = spans(recorded);
-        let shared = |bags: [usize; 2]| {
-            let [one, other] = bags.map(|bag| spans.some(bag));
-            let (one, other) = one.zip(other)?;
-            let part = Span::new(one.start.max(other.start), one.end.min(other.end));
-            (part.nanos() > NEAR_NS).then(|| (bags.to_vec(), Some(part)))
-        };
-        common.into_iter().filter_map(shared).collect::<Vec<_>>()
+    let is_small = affordable(reading).payload_bytes > 0;
+    let (mut small, mut large) = (BTreeSet::new(), BTreeMap::<_, BTreeMap<_, _>>::new());
+    for bags in by_key(recorded).values() {
+        let files = bags.keys().copied().filter(|bag| !inputs[*bag].is_pipe());
+        let unread = files.clone().filter(|bag| bags[bag].iter().any(is_unread));
+        let unread: BTreeSet<usize> = unread.collect();
+        let is_known =
+            |one: &usize, other: &usize| known.contains(&[*one.min(other), *one.max(other)]);
+        if is_small {
+            let is_new = |one: &usize| {
+                files
+                    .clone()
+                    .any(|other| other != *one && !is_known(one, &other))
+            };
+            let is_compared = unread.iter().any(is_new);
+            small.extend(files.filter(|_| is_compared));
+        } else {
+            let times = files.filter_map(|bag| Some((*spans.some(bag)?, bag)));
+            for ([one, other], shared) in overlapping(times.collect()) {
+                let is_read = !unread.contains(&one) && !unread.contains(&other);
+                if shared.nanos() > NEAR_NS && !is_read && !is_known(&one, &other) {
+                    let pairs = large.entry([part[one], part[other]]).or_default();
+                    pairs.insert([one, other], shared);
+                }
+            }
+        }
+    }
+    let longest = |pairs: BTreeMap<[usize; 2], Span>| {
+        let mut pairs: Vec<_> = pairs.into_iter().collect();
+        pairs.sort_by_key(|(_, shared)| Reverse(shared.nanos()));
+        pairs.truncate(SAMPLES);
+        pairs
+            .into_iter()
+            .map(|(bags, shared)| (bags.to_vec(), Some(shared)))
     };
-    for (bags, part) in samples.into_iter().filter(|(bags, _)| !bags.is_empty()) {
+    let whole = (small.into_iter().collect(), None);
+    let samples = std::iter::once(whole).chain(large.into_values().flat_map(longest));
+    for (bags, part) in samples.filter(|(bags, _): &(Vec<usize>, _)| !bags.is_empty()) {
         let inputs: Vec<&Input> = bags.iter().map(|bag| &inputs[*bag]).collect();
         let sample = sample(reading, &inputs, part)?;
         let found = sample.offsets.iter().filter(|pair| pair.is_one_robot);
@@ -94,12 +116,6 @@ pub(super) fn pairs(
     }
     // The clock of a recorder is that of all parts into which it splits its recording; parts that have little in common may agree by chance.
     let mut best: BTreeMap<[usize; 2], (usize, i64)> = BTreeMap::new();
-    let mut part = vec![0; inputs.len()];
-    for (at, bags) in parts.iter().enumerate() {
-        for bag in bags {
-            part[*bag] = at;
-        }
-    }
     for pair in &pairs {
         let (one, other) = (part[pair.bag], part[pair.other]);
         // Or of two recorders the one whose clock is so far ahead that its recording seems to be the next part.
@@ -112,19 +128,49 @@ pub(super) fn pairs(
             *known = (*known).max((pair.messages, ahead));
         }
     }
-    let bags = (0..inputs.len()).filter(|_| !best.is_empty());
-    let all = bags.flat_map(|bag| (0..bag).map(move |other| [bag, other]));
-    let pair = |[bag, other]: [usize; 2]| {
-        let (messages, ahead) = *best.get(&[part[bag], part[other]])?;
-        Some(ClockOffset {
-            bag,
-            other,
-            ahead,
-            messages,
-            is_one_robot: true,
-        })
-    };
-    Ok(all.filter_map(pair).collect())
+    let mut all = BTreeMap::new();
+    for ([one, other], (messages, ahead)) in best {
+        let moved = |at: usize, by| {
+            let spans = parts[at]
+                .iter()
+                .filter_map(|bag| Some((*spans.some(*bag)?, *bag)));
+            spans.map(move |(span, bag): (Span, usize)| (span.moved(by), bag))
+        };
+        let beside = overlapping(moved(one, -ahead).chain(moved(other, 0)).collect());
+        // By the first of the other's, the clock of a bag is corrected also at a time when the other did not record.
+        let first = parts[other].iter().min();
+        let firsts = first
+            .into_iter()
+            .flat_map(|first| parts[one].iter().map(|bag| [*first, *bag]));
+        for [before, bag] in beside.into_iter().map(|of| of.0).chain(firsts) {
+            if before < bag && [part[before], part[bag]] == [other, one] {
+                let offset = ClockOffset {
+                    bag,
+                    other: before,
+                    ahead,
+                    messages,
+                    is_one_robot: true,
+                };
+                all.insert((bag, before), offset);
+            }
+        }
+    }
+    Ok(all.into_values().collect())
+}
+
+/// The pairs of bags that recorded at one time, the one that was given first before the other, with that time.
+fn overlapping(mut bags: Vec<(Span, usize)>) -> Vec<([usize; 2], Span)> {
+    bags.sort_unstable_by_key(|(span, bag)| (span.start, *bag));
+    let (mut open, mut pairs) = (Vec::<(Span, usize)>::new(), Vec::new());
+    for (span, bag) in bags {
+        open.retain(|(before, _)| before.end > span.start);
+        pairs.extend(open.iter().map(|(before, other)| {
+            let shared = Span::new(span.start, span.end.min(before.end));
+            ([bag.min(*other), bag.max(*other)], shared)
+        }));
+        open.push((span, bag));
+    }
+    pairs
 }
 
 /// The messages that bags themselves contain twice, since recordings were merged; `seams`: where time goes back in each bag.
