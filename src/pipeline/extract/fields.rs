@@ -199,7 +199,7 @@ impl FieldTables {
         table.waiting += size;
         self.waiting += size;
         if table.waiting > MOST_WAITING {
-            self.write(at);
+            self.write(&[at]);
         }
         if self.waiting > MOST_WAITING_IN_ALL {
             self.make_room();
@@ -211,24 +211,29 @@ impl FieldTables {
     fn make_room(&mut self) {
         let mut order: Vec<usize> = (0..self.all.len()).collect();
         order.sort_by_key(|at| std::cmp::Reverse(self.all[*at].waiting));
-        for at in order {
-            if self.waiting <= MOST_WAITING_IN_ALL / 2 {
-                return;
-            }
-            self.write(at);
-        }
+        let mut left = self.waiting;
+        order.retain(|at| {
+            let is_over = left > MOST_WAITING_IN_ALL / 2;
+            left -= self.all[*at].waiting;
+            is_over
+        });
+        self.write(&order);
     }
 
-    /// Writes the buffered rows of a table.
-    fn write(&mut self, at: usize) {
-        if self.failed.is_none() {
-            let result = self.try_write(at);
-            self.failed = result.and_then(|()| self.unload()).err();
+    /// Writes the buffered rows of some tables.
+    fn write(&mut self, tables: &[usize]) {
+        for at in tables {
+            if self.failed.is_none() {
+                self.failed = self.try_write(*at).err();
+            }
+            let table = &mut self.all[*at];
+            self.waiting -= table.waiting;
+            table.waiting = 0;
+            table.batch.clear();
         }
-        let table = &mut self.all[at];
-        self.waiting -= table.waiting;
-        table.waiting = 0;
-        table.batch.clear();
+        if self.failed.is_none() {
+            self.failed = self.unload().err();
+        }
     }
 
     fn try_write(&mut self, at: usize) -> io::Result<()> {
@@ -289,14 +294,14 @@ impl FieldTables {
     /// rows; a topic without a decoded message has no table.
     fn finish(mut self) -> io::Result<Result<(usize, u64)>> {
         let (mut tables, mut rows) = (0, 0);
+        if let Some(failed) = self.failed.take() {
+            return Err(failed);
+        }
         for at in 0..self.all.len() {
             if self.all[at].rows == 0 {
                 continue;
             }
-            self.write(at);
-            if let Some(failed) = self.failed.take() {
-                return Err(failed);
-            }
+            self.try_write(at)?;
             if let Some(writer) = self.all[at].writer.take() {
                 writer.finish()?.into_inner()?;
             }
