@@ -31,7 +31,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     is_inside: |_| false,
     sniff: |place, _| matches!(place, BagPlace::Folder(_)),
     open,
-    follow: Some(growing::follow),
+    follow: Some(|path| Ok(Box::new(growing::GrowingFolder::new(path)))),
 };
 
 /// A folder's storage files.
