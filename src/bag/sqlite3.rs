@@ -351,15 +351,10 @@ impl Reader for Sqlite3Bag {
         }
         self.notices.iter().for_each(|n| clip.notice(n.clone()));
         let db = Db::open(&self.ready).map_err(|e| broken(&self.path, &e))?;
-        let mut tier = Tier::Index;
         // SQLite returns no rows where the first page of a table lost its entries.
         let any = "SELECT rowid FROM messages NOT INDEXED LIMIT 1";
-        let is_empty = matches!(db.first(any, &[], |row| row.integer(0)), Ok(None));
-        if self.verify || is_empty {
+        if self.verify || matches!(db.first(any, &[], |row| row.integer(0)), Ok(None)) {
             check(&db, &mut clip);
-        }
-        if self.verify {
-            tier = Tier::Verify;
         }
         let rows = RowReader::new(self, &wants, range);
         let parts = self.parts(&db, range);
@@ -374,7 +369,7 @@ impl Reader for Sqlite3Bag {
             name: file_name(&self.path),
             format: FORMAT.name.to_owned(),
             compression: vec![if self.packed { "zstd" } else { "none" }.to_owned()],
-            tier,
+            tier: [Tier::Index, Tier::Verify][usize::from(self.verify)],
             tier_reason: None,
             complete: !clip.lost,
             bytes_read: 0,

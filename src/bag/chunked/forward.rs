@@ -204,10 +204,7 @@ impl<G: Grammar> Walk<G> {
             _ if walk.ended && is_cut => {
                 format!("the bag is cut at byte {at}, behind its messages")
             }
-            NoRecord::End if walk.begun => {
-                format!("the bag was never finished; it ends at byte {at}")
-            }
-            NoRecord::End => format!("the bag ends at byte {at}, before its first record"),
+            NoRecord::End => format!("the bag was never finished; it ends at byte {at}"),
             NoRecord::Cut => format!("the bag is cut at byte {at}"),
             NoRecord::Broken => format!("no record at byte {at}"),
             NoRecord::Io(e) => format!("reading stopped at byte {at}: {e}"),
