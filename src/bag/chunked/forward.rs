@@ -100,8 +100,8 @@ pub(super) struct Walk<G> {
     compression: BTreeSet<Compression>,
     allowance: Arc<Allowance>,
     account: Account,
-    /// Whether a record was found: even a bag that was never closed has its head.
-    begun: bool,
+    /// The number of records found: even a bag that was never closed has its head.
+    records: u64,
     /// Whether the end of the data was reached, and the record that ends the file.
     ended: bool,
     closed: bool,
@@ -199,7 +199,7 @@ impl<G: Grammar> Walk<G> {
         let walk = forward.walk;
         let is_cut = !matches!(stop, NoRecord::Io(_));
         let text = match stop {
-            NoRecord::End if !G::HAS_END && walk.begun => return self.compression,
+            NoRecord::End if !G::HAS_END && walk.records > 0 => return self.compression,
             _ if walk.closed && is_cut => return self.compression,
             _ if walk.ended && is_cut => {
                 format!("the bag is cut at byte {at}, behind its messages")
@@ -227,7 +227,7 @@ impl<G: Grammar> Forward<'_, G> {
         from: u64,
         record: RecordHead<G::Description>,
     ) -> Result<(), NoRecord> {
-        self.walk.begun = true;
+        self.walk.records += 1;
         let is_content = matches!(record, RecordHead::Chunk(_) | RecordHead::Message { .. });
         if self.walk.ended && is_content {
             self.walk.ended = false;
