@@ -8,6 +8,7 @@ use std::time::SystemTime;
 
 use super::InputKind;
 use super::input::{Input, file_name};
+use super::rosbag2::is_storage;
 use super::source::FileSource;
 use super::split;
 use crate::bag::decompress::{ZSTD_HEAD, zstd_stated};
@@ -224,10 +225,6 @@ pub(crate) fn is_growing(folder: &Path) -> bool {
     let storage = paths.iter().filter(|path| is_storage(path));
     let stems: Option<BTreeSet<String>> = storage.map(|path| numbered(path)).collect();
     stems.is_some_and(|stems| stems.len() == 1) || folder.join("metadata.yaml").is_file()
-}
-
-fn is_storage(path: &Path) -> bool {
-    [".db3", ".mcap", ".zstd"].iter().any(|e| ends_in(path, e))
 }
 
 /// The longest `metadata.yaml` that is searched for names, in bytes.

@@ -20,7 +20,8 @@ use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::OUT_OF_ORDER_NS;
 use crate::base::time::{Span, Stamp};
-use metadata::{Metadata, is_storage};
+use metadata::Metadata;
+pub(super) use metadata::is_storage;
 
 /// The format of rosbag2 folders.
 pub(crate) const FORMAT: FormatRow = FormatRow {

@@ -126,7 +126,7 @@ impl<'a> Draft<'a> {
                 part,
                 orientation,
             };
-            (part, best_block(task, orderings))
+            (task, best_block(task, orderings))
         });
         assembled(plan, options, &blocks.collect::<Vec<_>>(), orientation)
     }
@@ -509,25 +509,18 @@ impl PlacedPart {
 pub(crate) fn assembled(
     plan: &Plan,
     options: &LayoutOptions,
-    blocks: &[(&Component, PlacedPart)],
+    blocks: &[(PartTask<'_>, PlacedPart)],
     orientation: Orientation,
 ) -> (u64, Layout) {
-    let task = |part| PartTask {
-        plan,
-        options,
-        part,
-        orientation,
-    };
-    let bounds = blocks.iter();
-    let bounds = bounds.map(|(part, block)| block.with_labels(task(part)));
+    let bounds = blocks.iter().map(|(task, block)| block.with_labels(*task));
     let bounds: Vec<Rect> = bounds.collect();
     let sizes: Vec<Size> = bounds.iter().map(|b| Size::new(b.w, b.h)).collect();
     let (mut corners, mut size) = pack::pack(&sizes, options.page, PART_GAP);
     if (2..=MOST_NESTED).contains(&blocks.len()) && plan.links.len() <= MANY {
         let taken = blocks.iter().zip(&bounds);
-        let taken = taken.map(|((part, block), bounds)| {
+        let taken = taken.map(|((task, block), bounds)| {
             let corner = Point::new(-bounds.x, -bounds.y);
-            let taken = block.taken(task(part)).into_iter();
+            let taken = block.taken(*task).into_iter();
             taken.map(|rect| rect.moved(corner)).collect()
         });
         let shapes: Vec<Vec<Rect>> = taken.collect();
@@ -545,7 +538,8 @@ pub(crate) fn assembled(
         clusters: vec![Rect::default(); plan.clusters.len()],
         ..Layout::default()
     };
-    for (((part, block), corner), bounds) in blocks.iter().zip(corners).zip(bounds) {
+    for (((PartTask { part, .. }, block), corner), bounds) in blocks.iter().zip(corners).zip(bounds)
+    {
         let corner = Point::new(corner.x - bounds.x, corner.y - bounds.y);
         for (&v, at) in part.vertices.iter().zip(&block.boxes) {
             layout.boxes[v] = at.moved(corner);

@@ -138,9 +138,9 @@ pub(super) fn leads_out(name: &str) -> String {
 }
 
 /// Whether a file has the name of a storage file.
-pub(super) fn is_storage(path: &Path) -> bool {
+pub(in crate::bag) fn is_storage(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = name.to_lowercase();
     let name = name.strip_suffix(".zstd").unwrap_or(&name);
-    let end = Path::new(name).extension();
-    end.is_some_and(|e| e == "db3" || e == "mcap")
+    [".db3", ".mcap"].iter().any(|end| name.ends_with(end))
 }

@@ -145,7 +145,7 @@ impl Segments {
         Some((a.towards(b, t), (b.x - a.x).abs() > (b.y - a.y).abs()))
     }
 
-    /// The best middle for a label of this size, if any is free; with `strict`, one that is on no other edge.
+    /// The best middle for a label of this size on or beside its `own` edge, if one is free and on no other edge.
     fn spot(&self, size: Size, own: usize, taken: &Obstacles, edges: &Obstacles) -> Option<Point> {
         let mut best: Option<(f64, Point)> = None;
         for (turn, &part) in STATIONS.iter().enumerate() {
