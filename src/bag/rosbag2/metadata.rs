@@ -144,3 +144,16 @@ pub(in crate::bag) fn is_storage(path: &Path) -> bool {
     let name = name.strip_suffix(".zstd").unwrap_or(&name);
     [".db3", ".mcap"].iter().any(|end| name.ends_with(end))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn storage_files_are_known_by_their_names() {
+        let is = |name: &str| is_storage(Path::new(name));
+        assert!(["run_0.db3", "RUN_0.MCAP", "a/run_0.mcap.zstd"].map(is) == [true; 3]);
+        // A compressed ROS 1 bag is no part of a rosbag2 folder.
+        assert!(["run_0.bag.zstd", "metadata.yaml", "db3"].map(is) == [false; 3]);
+    }
+}
