@@ -269,6 +269,8 @@ fn rankings(part: &Component, options: &LayoutOptions) -> Vec<Vec<usize>> {
     let mut rankings = Vec::new();
     for reversed in ways {
         let (rank, edges) = ranked(&reversed);
+        // Without the numbers of layers beside the suitable one, tight drawings are 1.4 % smaller; with two more on each side, 1.5 %
+        // larger.
         let near = if options.is_tight { 2 } else { 0 };
         let counts = layer_fold::suitable(n, aspect)
             .into_iter()
