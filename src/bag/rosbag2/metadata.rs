@@ -6,7 +6,7 @@ use std::io::Read as _;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use crate::bag::folder::is_spare;
+use crate::bag::folder::{is_spare, is_storage};
 use crate::base::budget::YAML;
 use crate::base::file::with_suffix;
 use crate::base::yaml::{self, Value};
@@ -135,25 +135,4 @@ pub(super) fn is_inside(folder: &Path, file: &Path) -> bool {
 /// The notice about a link that leads out of the folder.
 pub(super) fn leads_out(name: &str) -> String {
     format!("`{name}` is a link out of the folder and was not followed")
-}
-
-/// Whether a file has the name of a storage file.
-pub(in crate::bag) fn is_storage(path: &Path) -> bool {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let name = name.to_lowercase();
-    let name = name.strip_suffix(".zstd").unwrap_or(&name);
-    [".db3", ".mcap"].iter().any(|end| name.ends_with(end))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn storage_files_are_known_by_their_names() {
-        let is = |name: &str| is_storage(Path::new(name));
-        assert!(["run_0.db3", "RUN_0.MCAP", "a/run_0.mcap.zstd"].map(is) == [true; 3]);
-        // A compressed ROS 1 bag is no part of a rosbag2 folder.
-        assert!(["run_0.bag.zstd", "metadata.yaml", "db3"].map(is) == [false; 3]);
-    }
 }
