@@ -33,7 +33,8 @@ use index::Query;
 pub(crate) use index::{ChunkBody, Index, IndexSum, LONGEST_INDEX};
 pub(crate) use plan::{Chunk, ChunkPlan, Fault, Tail, Unindexed};
 pub(crate) use record::{
-    ChunkHead, Connections, Counts, NoRecord, RecordHead, SecondFinds, pass, peek_whole, walk,
+    ChunkHead, Connections, Counts, MessageHead, NoRecord, RecordHead, SecondFinds, pass,
+    peek_whole, walk,
 };
 
 /// The parser for one format of chunked bags. A value keeps the state that later descriptions depend on.

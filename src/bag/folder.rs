@@ -226,8 +226,12 @@ pub(crate) fn is_growing(folder: &Path) -> bool {
     stems.is_some_and(|stems| stems.len() == 1) || folder.join("metadata.yaml").is_file()
 }
 
-fn is_storage(path: &Path) -> bool {
-    [".db3", ".mcap", ".zstd"].iter().any(|e| ends_in(path, e))
+/// Whether a file has the name of a storage file.
+pub(super) fn is_storage(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = name.to_lowercase();
+    let name = name.strip_suffix(".zstd").unwrap_or(&name);
+    [".db3", ".mcap"].iter().any(|end| name.ends_with(end))
 }
 
 /// The longest `metadata.yaml` that is searched for names, in bytes.
@@ -289,4 +293,17 @@ fn ends_in(path: &Path, extension: &str) -> bool {
         .to_string_lossy()
         .to_lowercase();
     name.ends_with(&format!(".{}", extension.trim_start_matches('.')))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn storage_files_are_known_by_their_names() {
+        let is = |name: &str| is_storage(Path::new(name));
+        assert!(["run_0.db3", "RUN_0.MCAP", "a/run_0.mcap.zstd"].map(is) == [true; 3]);
+        // A compressed ROS 1 bag is no part of a rosbag2 folder.
+        assert!(["run_0.bag.zstd", "metadata.yaml", "db3"].map(is) == [false; 3]);
+    }
 }

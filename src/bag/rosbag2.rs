@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use crate::bag::adapters::known_span;
 use crate::bag::deferred::open_each;
-use crate::bag::folder::{Recording, is_spare, only_recording, recordings};
+use crate::bag::folder::{Recording, is_spare, is_storage, only_recording, recordings};
 use crate::bag::input::{BagPlace, FormatRow, Input, file_name, size_on_disk};
 use crate::bag::model::{
     Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink, Want, damaged,
@@ -20,7 +20,7 @@ use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::OUT_OF_ORDER_NS;
 use crate::base::time::{Span, Stamp};
-use metadata::{Metadata, is_storage};
+use metadata::Metadata;
 
 /// The format of rosbag2 folders.
 pub(crate) const FORMAT: FormatRow = FormatRow {
@@ -31,7 +31,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     is_inside: |_| false,
     sniff: |place, _| matches!(place, BagPlace::Folder(_)),
     open,
-    follow: Some(growing::follow),
+    follow: Some(|path| Ok(Box::new(growing::GrowingFolder::new(path)))),
 };
 
 /// A folder's storage files.

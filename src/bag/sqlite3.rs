@@ -36,7 +36,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     is_inside: |_| false,
     sniff: |_, head| head.starts_with(b"SQLite format 3\0"),
     open,
-    follow: Some(growing::follow),
+    follow: Some(|path| Ok(Box::new(growing::GrowingDb::new(path)))),
 };
 
 /// A database with its topics.

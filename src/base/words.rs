@@ -325,32 +325,36 @@ pub fn some_of<S: AsRef<str>>(names: &[S], most: usize) -> String {
 /// `text` with line ends, other control characters, invisible and direction marks escaped as `\u{…}`, so that it can
 /// neither control a terminal nor hide or reverse adjacent text.
 pub fn visible(text: &str) -> Cow<'_, str> {
-    if !text.contains(is_invisible) {
-        return Cow::Borrowed(text);
-    }
-    let mut out = String::with_capacity(text.len() + 8);
-    for c in text.chars() {
-        if is_invisible(c) {
-            out.extend(c.escape_unicode());
-        } else {
-            out.push(c);
-        }
-    }
-    Cow::Owned(out)
+    replaced(text, is_invisible, |c, out| out.extend(c.escape_unicode()))
 }
 
 /// JSON with the invisible characters of its strings escaped as `\uXXXX`, for printing; they only occur in strings.
 pub(crate) fn visible_json(json: &str) -> Cow<'_, str> {
     let is_plain = |byte: u8| matches!(byte, b' '..=b'~' | b'\n');
-    if json.bytes().all(is_plain) || !json.contains(|c: char| c != '\n' && is_invisible(c)) {
+    if json.bytes().all(is_plain) {
         return Cow::Borrowed(json);
     }
-    let mut out = String::with_capacity(json.len());
-    for c in json.chars() {
-        if c != '\n' && is_invisible(c) {
-            let mut units = [0; 2];
-            let units = c.encode_utf16(&mut units).iter();
-            out.extend(units.map(|unit| format!("\\u{unit:04x}")));
+    let is_hidden = |c| c != '\n' && is_invisible(c);
+    replaced(json, is_hidden, |c, out| {
+        let mut units = [0; 2];
+        let units = c.encode_utf16(&mut units).iter();
+        out.extend(units.map(|unit| format!("\\u{unit:04x}")));
+    })
+}
+
+/// The text with what `write` writes for each character of which `is` is true.
+fn replaced(
+    text: &str,
+    is: impl Fn(char) -> bool,
+    write: impl Fn(char, &mut String),
+) -> Cow<'_, str> {
+    if !text.contains(&is) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len() + 8);
+    for c in text.chars() {
+        if is(c) {
+            write(c, &mut out);
         } else {
             out.push(c);
         }

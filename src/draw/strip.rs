@@ -151,7 +151,7 @@ fn columns(choice: &Choice, panels: usize, natural: Size) -> usize {
 /// times as many as can be told apart.
 const MOST_GROUPS: usize = 200_000;
 
-/// The largest area of panels in square pixels that a strip on a screen may take for legible text.
+/// The largest area of panels in square pixels that a strip on a screen may take for legible text: 96 MB of pixels.
 const LARGEST_STRIP: f64 = 24e6;
 
 /// The grid of panels.

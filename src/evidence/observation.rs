@@ -171,7 +171,7 @@ pub struct EvidenceLine {
 }
 
 /// Statistics of the messages of a topic in an interval: over one connection, or at one end of it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Measurement {
     /// The topic; `None`: the only one that the subscriber subscribes to.
     pub(crate) topic: Option<Name>,

@@ -225,9 +225,42 @@ fn to_io(error: gif::EncodingError) -> io::Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::encoder::testing::packed;
+    use crate::base::geometry::Size;
+    use crate::draw::paint::raster::Pixels;
+    use crate::draw::scene::Scene;
+    use crate::draw::style::Color;
 
     const SIZE: (u16, u16) = (40, 30);
+
+    /// The packet of a frame with these palette indices.
+    fn packed(
+        palette: &Palette,
+        before: &[u8],
+        indices: &[u8],
+        (width, height): (u16, u16),
+        pack: Pack,
+    ) -> Packet {
+        let pixels = Pixels {
+            width: width.into(),
+            height: height.into(),
+            rgba: Vec::new(),
+        };
+        let scene = Scene {
+            size: Size::new(width.into(), height.into()),
+            width_mm: None,
+            background: Color::NONE,
+            title: String::new(),
+            groups: Vec::new(),
+        };
+        pack(&DrawnFrame {
+            scene: &scene,
+            pixels: &pixels,
+            palette,
+            indices,
+            before,
+        })
+        .unwrap()
+    }
 
     fn colours() -> Palette {
         Palette::new(vec![[255; 3], [200, 30, 30], [10, 20, 120]])

@@ -227,6 +227,11 @@ pub struct Finding {
     pub(crate) is_open: bool,
 }
 
+/// The text with its control characters escaped.
+fn escaped(text: impl fmt::Display) -> String {
+    visible(&text.to_string()).into_owned()
+}
+
 impl Finding {
     /// A finding about a name, of severity [`Severity::Error`].
     pub(crate) fn new(
@@ -240,7 +245,7 @@ impl Finding {
             severity: Severity::Error,
             place,
             name: visible(name).into_owned(),
-            text: visible(&text.to_string()).into_owned(),
+            text: escaped(text),
             seen: String::new(),
             expected: String::new(),
             when: None,
@@ -271,8 +276,8 @@ impl Finding {
 
     /// The finding with the observed and the expected value.
     pub(crate) fn saw(mut self, seen: impl fmt::Display, expected: impl fmt::Display) -> Self {
-        self.seen = visible(&seen.to_string()).into_owned();
-        self.expected = visible(&expected.to_string()).into_owned();
+        self.seen = escaped(seen);
+        self.expected = escaped(expected);
         self
     }
 
@@ -290,17 +295,13 @@ impl Finding {
 
     /// The finding with more lines.
     pub(crate) fn details<T: fmt::Display>(mut self, lines: impl IntoIterator<Item = T>) -> Self {
-        let lines = lines.into_iter().map(|line| line.to_string());
-        self.details
-            .extend(lines.map(|line| visible(&line).into_owned()));
+        self.details.extend(lines.into_iter().map(escaped));
         self
     }
 
     /// The finding with hints.
     pub(crate) fn hints<T: fmt::Display>(mut self, hints: impl IntoIterator<Item = T>) -> Self {
-        let hints = hints.into_iter().map(|hint| hint.to_string());
-        self.help
-            .extend(hints.map(|hint| visible(&hint).into_owned()));
+        self.help.extend(hints.into_iter().map(escaped));
         self
     }
 

@@ -511,12 +511,6 @@ impl ColumnWriter {
 }
 
 impl Column {
-    /// The number of bytes.
-    #[cfg(test)]
-    fn len(&self) -> usize {
-        self.bytes.len()
-    }
-
     /// A cursor at the first window.
     pub(crate) fn cursor(&self) -> ColumnCursor<'_> {
         ColumnCursor {

@@ -29,14 +29,16 @@ use order::{LayerOrder, Search};
 
 /// The space between parts: more than between boxes, so that parts are seen as such.
 const PART_GAP: f64 = 20.0;
-/// The most parts of which small ones are placed in the gaps of others.
+/// The most parts of which small ones are placed in the gaps of others, as the work grows with the square of their
+/// number. With none, edges are 0.5 % longer; with 12, no drawing measured changes.
 const MOST_NESTED: usize = 24;
 /// The largest number of edges of a part that is cut in several ways; a larger one is cut only in the way that keeps it
-/// small. Each way is a whole layout.
+/// small. Each way is a whole layout: with 600, 1.8 times the time for no better drawings; with 150, 1 % more crossings.
 const MANY: usize = 300;
 /// The largest number of items in layers that are laid out.
 const MOST: usize = 150_000;
-/// The number of edges that the search for good orders may sweep, in all parts together.
+/// The number of edges that the search for good orders may sweep, in all parts together. Half: 1 % more crossings and 1 % fewer labels
+/// with a place; twice: 0.6 % fewer crossings in 1.08 times the time.
 const EFFORT: usize = 120_000;
 
 /// The default engine.
@@ -126,7 +128,7 @@ impl<'a> Draft<'a> {
                 part,
                 orientation,
             };
-            (part, best_block(task, orderings))
+            (task, best_block(task, orderings))
         });
         assembled(plan, options, &blocks.collect::<Vec<_>>(), orientation)
     }
@@ -151,6 +153,7 @@ fn orderings(plan: &Plan, part: &Component, options: &LayoutOptions) -> Vec<Orde
     if part.ends.len() <= MANY && !part.clusters.is_empty() {
         lanes.push(Lane::Outside);
     }
+    // A tight drawing is tried where a little may make it legible: with a third of the effort, they are 0.1 % smaller.
     let effort = if options.is_tight { 3 * EFFORT } else { EFFORT };
     let share = effort * part.vertices.len() / plan.vertices.len().max(1);
     let effort = share / ways.len().max(1) / lanes.len();
@@ -266,6 +269,8 @@ fn rankings(part: &Component, options: &LayoutOptions) -> Vec<Vec<usize>> {
     let mut rankings = Vec::new();
     for reversed in ways {
         let (rank, edges) = ranked(&reversed);
+        // Without the numbers of layers beside the suitable one, tight drawings are 1.4 % smaller; with two more on each side, 1.5 %
+        // larger.
         let near = if options.is_tight { 2 } else { 0 };
         let counts = layer_fold::suitable(n, aspect)
             .into_iter()
@@ -509,25 +514,18 @@ impl PlacedPart {
 pub(crate) fn assembled(
     plan: &Plan,
     options: &LayoutOptions,
-    blocks: &[(&Component, PlacedPart)],
+    blocks: &[(PartTask<'_>, PlacedPart)],
     orientation: Orientation,
 ) -> (u64, Layout) {
-    let task = |part| PartTask {
-        plan,
-        options,
-        part,
-        orientation,
-    };
-    let bounds = blocks.iter();
-    let bounds = bounds.map(|(part, block)| block.with_labels(task(part)));
+    let bounds = blocks.iter().map(|(task, block)| block.with_labels(*task));
     let bounds: Vec<Rect> = bounds.collect();
     let sizes: Vec<Size> = bounds.iter().map(|b| Size::new(b.w, b.h)).collect();
     let (mut corners, mut size) = pack::pack(&sizes, options.page, PART_GAP);
     if (2..=MOST_NESTED).contains(&blocks.len()) && plan.links.len() <= MANY {
         let taken = blocks.iter().zip(&bounds);
-        let taken = taken.map(|((part, block), bounds)| {
+        let taken = taken.map(|((task, block), bounds)| {
             let corner = Point::new(-bounds.x, -bounds.y);
-            let taken = block.taken(task(part)).into_iter();
+            let taken = block.taken(*task).into_iter();
             taken.map(|rect| rect.moved(corner)).collect()
         });
         let shapes: Vec<Vec<Rect>> = taken.collect();
@@ -545,7 +543,8 @@ pub(crate) fn assembled(
         clusters: vec![Rect::default(); plan.clusters.len()],
         ..Layout::default()
     };
-    for (((part, block), corner), bounds) in blocks.iter().zip(corners).zip(bounds) {
+    for (((PartTask { part, .. }, block), corner), bounds) in blocks.iter().zip(corners).zip(bounds)
+    {
         let corner = Point::new(corner.x - bounds.x, corner.y - bounds.y);
         for (&v, at) in part.vertices.iter().zip(&block.boxes) {
             layout.boxes[v] = at.moved(corner);

@@ -88,7 +88,7 @@ fn lay_out(plan: &Plan, options: &LayoutOptions, orientation: Orientation) -> Re
             part,
             orientation,
         };
-        Some((part, block(task)?))
+        Some((task, block(task)?))
     });
     let blocks = blocks.collect::<Option<Vec<_>>>().ok_or_else(|| {
         Error::usage(

@@ -6,7 +6,8 @@ use crate::base::geometry::{Point, Rect, Size};
 /// The space around boxes, and inside the frames of clusters: an edge passes between.
 const GAP: f64 = 10.0;
 const PADDING: f64 = 8.0;
-/// The largest distance from its neighbours at which a new box is tried, in steps of less than half a box.
+/// The largest distance from its neighbours at which a new box is tried, in steps of less than half a box: most of a page, beyond
+/// which nobody looks for it.
 const RINGS: i32 = 30;
 const STEP: Size = Size::new(30.0, 20.0);
 

@@ -1,4 +1,5 @@
-//! A mission as it is drawn: its view, the page and the positions of everything. Only this file calls `view` and `layout`.
+//! A mission as it is drawn: its view, the page and the positions of everything. Only this file calls `view` and,
+//! but for DOT, `layout`.
 //!
 //! In come a mission and a [`Drawing`]; out comes a [`Composed`]. [`super::fit`] tries several until one is legible.
 

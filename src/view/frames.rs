@@ -379,20 +379,6 @@ pub struct Headline {
     pub leaves: bool,
 }
 
-impl Headline {
-    /// The start of a node.
-    #[cfg(test)]
-    pub(crate) fn started() -> Self {
-        Self {
-            event: EventId(0),
-            kind: Kind::Started,
-            what: Element::Node(crate::graph::NodeId(0)),
-            time: Stamp(0),
-            leaves: false,
-        }
-    }
-}
-
 /// Elements with the same change in a window: `+ planner, costmap start`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Phrase {

@@ -44,6 +44,19 @@ pub enum Mark {
 }
 
 impl Mark {
+    /// Those with a badge.
+    pub(crate) const BADGED: [Self; 9] = [
+        Self::Added,
+        Self::Removed,
+        Self::Faster,
+        Self::Slower,
+        Self::HandedOver,
+        Self::Restarted,
+        Self::Paused,
+        Self::Changed,
+        Self::Inside,
+    ];
+
     /// Its exact word in SVG.
     pub(crate) fn word(self) -> &'static str {
         match self {

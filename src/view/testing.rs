@@ -8,10 +8,23 @@ use crate::evidence::Confidence;
 use crate::graph::{
     Edge, Element, ElementState, Elements, Existence, Graph, Node, NodeId, State, Topic, TopicId,
 };
+use crate::mission::event_log::{EventId, Kind};
 use crate::mission::{Mission, Window};
+use crate::view::Headline;
 
 /// The length of a window.
 const LENGTH: i64 = 10_000_000_000;
+
+/// The start of a node.
+pub(crate) fn started() -> Headline {
+    Headline {
+        event: EventId(0),
+        kind: Kind::Started,
+        what: Element::Node(NodeId(0)),
+        time: Stamp(0),
+        leaves: false,
+    }
+}
 
 /// A mission with a window per text. `/a>/t` is a publication and `/b</t` a subscription, `/a` alone a node, `=/t`
 /// a topic; `@15` after one of them is its rate (of the topic too, for a publication), `~` makes it silent. Windows last ten seconds.

@@ -5,13 +5,12 @@ use std::io;
 use super::Grammar;
 use super::index::{ChunkBody, Index, IndexSum, LONGEST_INDEX, Query, hand_over, nameless, spans};
 use super::plan::Chunk;
-use super::record::{NoRecord, RecordHead};
+use super::record::{MessageHead, NoRecord, RecordHead};
 use super::search::next_chunk;
 use super::unpack::{Visitor, unpack};
 use crate::bag::adapters::Gather;
 use crate::bag::model::{Sink, Want, damaged, lost};
 use crate::bag::source::{ByteStream, FAR, GLANCE};
-use crate::base::time::Stamp;
 
 impl<G: Grammar> Query<'_, G> {
     /// Reports all stamps of `chunk` and the wanted parts of its messages to `sink`.
@@ -208,19 +207,15 @@ struct ChunkWalk<'a, 's, G> {
 }
 
 impl<G: Grammar> Visitor<G> for ChunkWalk<'_, '_, G> {
-    fn message(
-        &mut self,
-        stream: &mut ByteStream<'_>,
-        (raw, time, size): (u32, Stamp, u32),
-    ) -> Result<(), NoRecord> {
-        let Some(id) = self.query.connections.get(raw) else {
+    fn message(&mut self, stream: &mut ByteStream<'_>, head: MessageHead) -> Result<(), NoRecord> {
+        let Some(id) = self.query.connections.get(head.raw) else {
             nameless(self.sink, 1);
-            return super::record::pass(stream, u64::from(size));
+            return super::record::pass(stream, u64::from(head.size));
         };
         let want: Want = self.query.wants[id.0 as usize];
-        hand_over(stream, (id, time, size), want, self.sink)?;
+        hand_over(stream, (id, want), head, self.sink)?;
         if self.what == Share::Whole {
-            self.gather.add(id, time, size, self.sink);
+            self.gather.add(id, head.time, head.size, self.sink);
         }
         Ok(())
     }

@@ -8,7 +8,9 @@ use super::Grammar;
 use super::check::{Behind, ChunkMessages};
 use super::index::{OTHER_TIMES, absent, hand_over, nameless, spans};
 use super::plan::MOST_CHUNKS;
-use super::record::{Announced, ChunkHead, Counts, NoRecord, RecordHead, pass, peek_whole, walk};
+use super::record::{
+    Announced, ChunkHead, Counts, MessageHead, NoRecord, RecordHead, pass, peek_whole, walk,
+};
 use super::search::{Before, next_chunk, next_record};
 use super::unpack::{Visitor, records, unpack};
 use crate::bag::decompress::{Allowance, Compression};
@@ -100,8 +102,8 @@ pub(super) struct Walk<G> {
     compression: BTreeSet<Compression>,
     allowance: Arc<Allowance>,
     account: Account,
-    /// Whether a record was found: even a bag that was never closed has its head.
-    begun: bool,
+    /// The number of records found: even a bag that was never closed has its head.
+    records: u64,
     /// Whether the end of the data was reached, and the record that ends the file.
     ended: bool,
     closed: bool,
@@ -199,7 +201,7 @@ impl<G: Grammar> Walk<G> {
         let walk = forward.walk;
         let is_cut = !matches!(stop, NoRecord::Io(_));
         let text = match stop {
-            NoRecord::End if !G::HAS_END && walk.begun => return self.compression,
+            NoRecord::End if !G::HAS_END && walk.records > 0 => return self.compression,
             _ if walk.closed && is_cut => return self.compression,
             _ if walk.ended && is_cut => {
                 format!("the bag is cut at byte {at}, behind its messages")
@@ -227,8 +229,8 @@ impl<G: Grammar> Forward<'_, G> {
         from: u64,
         record: RecordHead<G::Description>,
     ) -> Result<(), NoRecord> {
-        self.walk.begun = true;
-        let is_content = matches!(record, RecordHead::Chunk(_) | RecordHead::Message { .. });
+        self.walk.records += 1;
+        let is_content = matches!(record, RecordHead::Chunk(_) | RecordHead::Message(_));
         if self.walk.ended && is_content {
             self.walk.ended = false;
             self.damage("messages follow the end of the data");
@@ -238,12 +240,12 @@ impl<G: Grammar> Forward<'_, G> {
         }
         match record {
             RecordHead::Chunk(head) => self.chunk(stream, from, &head),
-            RecordHead::Message { raw, time, size } => {
+            RecordHead::Message(head) => {
                 if self.walk.is_chunked && !G::IS_LOOSE {
                     self.damage("messages are outside of chunks");
                 }
                 self.walk.compression.insert(Compression::None);
-                self.message(stream, (raw, time, size))
+                self.message(stream, head)
             }
             RecordHead::Description { what, len } => self.description(stream, &what, len),
             RecordHead::Index { raw, count, len } => self.index(stream, (raw, count), len),
@@ -431,11 +433,8 @@ impl<G: Grammar> Forward<'_, G> {
 }
 
 impl<G: Grammar> Visitor<G> for Forward<'_, G> {
-    fn message(
-        &mut self,
-        stream: &mut ByteStream<'_>,
-        (raw, time, size): (u32, Stamp, u32),
-    ) -> Result<(), NoRecord> {
+    fn message(&mut self, stream: &mut ByteStream<'_>, head: MessageHead) -> Result<(), NoRecord> {
+        let MessageHead { raw, time, size } = head;
         let (first, last) = self.walk.times.unwrap_or((time, time));
         self.walk.times = Some((first.min(time), last.max(time)));
         let Some((id, want)) = self.walk.announced.get(raw) else {
@@ -446,7 +445,7 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
             }
             return Ok(());
         };
-        hand_over(stream, (id, time, size), want, self.sink)?;
+        hand_over(stream, (id, want), head, self.sink)?;
         let messages = &mut self.walk.found_messages;
         messages.add(id, time, size, self.sink);
         Ok(())

@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::Grammar;
-use super::record::{Connections, RecordHead};
+use super::record::{Connections, MessageHead, RecordHead};
 use crate::bag::adapters::MOST_CUTS;
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want, damaged};
@@ -254,7 +254,7 @@ impl<G: Grammar> Query<'_, G> {
         }
         let (expected, _) = index.runs[one.run];
         let size = match G::next(stream).ok()? {
-            RecordHead::Message { raw, size, .. } if raw == expected => size,
+            RecordHead::Message(head) if head.raw == expected => head.size,
             _ => return None,
         };
         let connection = self.connections.get(expected)?;
@@ -310,8 +310,8 @@ pub(super) fn absent(sink: &mut dyn Sink, count: u64) {
 /// Passes on the wanted part of the message at the position of `stream`, and skips it.
 pub(super) fn hand_over(
     stream: &mut ByteStream<'_>,
-    (connection, time, size): (ConnectionId, Stamp, u32),
-    want: Want,
+    (connection, want): (ConnectionId, Want),
+    MessageHead { time, size, .. }: MessageHead,
     sink: &mut dyn Sink,
 ) -> Result<(), super::record::NoRecord> {
     if let Some(data) = wanted_part(stream, size, want, sink)? {

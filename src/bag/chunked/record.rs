@@ -18,8 +18,8 @@ use crate::base::time::Stamp;
 pub(crate) enum RecordHead<D> {
     /// A chunk, whose body follows.
     Chunk(ChunkHead),
-    /// A message of the connection with the number `raw`; its payload follows.
-    Message { raw: u32, time: Stamp, size: u32 },
+    /// A message; its payload follows.
+    Message(MessageHead),
     /// A description of connections.
     Description { what: D, len: u64 },
     /// The number of messages of a connection in the previous chunk; their entries follow.
@@ -47,6 +47,14 @@ pub(crate) enum RecordHead<D> {
     Unknown { len: u64, extension: bool },
 }
 
+/// A message of the connection with the number `raw`, and the size of its payload in bytes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MessageHead {
+    pub(crate) raw: u32,
+    pub(crate) time: Stamp,
+    pub(crate) size: u32,
+}
+
 impl<D> RecordHead<D> {
     /// Whether it only occurs after the end of the data, in formats that state one.
     pub(crate) fn is_of_the_end(&self) -> bool {
@@ -60,7 +68,7 @@ impl<D> RecordHead<D> {
     pub(crate) fn len(&self) -> u64 {
         match self {
             Self::Chunk(head) => head.packed.saturating_add(head.padding),
-            Self::Message { size, .. } => u64::from(*size),
+            Self::Message(head) => u64::from(head.size),
             Self::Description { len, .. }
             | Self::Index { len, .. }
             | Self::Total { len, .. }

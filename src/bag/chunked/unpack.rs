@@ -4,21 +4,16 @@ use std::io::Read;
 use std::sync::Arc;
 
 use super::Grammar;
-use super::record::{ChunkHead, NoRecord, RecordHead, pass, walk};
+use super::record::{ChunkHead, MessageHead, NoRecord, RecordHead, pass, walk};
 use super::search::next_record;
 use crate::bag::checksum::CrcReader;
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::source::ByteStream;
-use crate::base::time::Stamp;
 
 /// The receiver of a chunk's records.
 pub(super) trait Visitor<G: Grammar> {
     /// A message, whose payload is next in `stream`.
-    fn message(
-        &mut self,
-        stream: &mut ByteStream<'_>,
-        message: (u32, Stamp, u32),
-    ) -> Result<(), NoRecord>;
+    fn message(&mut self, stream: &mut ByteStream<'_>, head: MessageHead) -> Result<(), NoRecord>;
 
     /// A description, the next `len` bytes of `stream`.
     fn description(
@@ -125,9 +120,7 @@ pub(super) fn records<G: Grammar>(
                 return Err(NoRecord::Broken);
             }
             match record {
-                RecordHead::Message { raw, time, size } => {
-                    visitor.message(stream, (raw, time, size))
-                }
+                RecordHead::Message(head) => visitor.message(stream, head),
                 RecordHead::Description { what, len } => visitor.description(stream, &what, len),
                 odd => {
                     is_odd = true;

@@ -10,7 +10,7 @@ use mcap::records::op;
 
 use super::{Described, Mcap};
 use crate::bag::checksum::Checksum;
-use crate::bag::chunked::{ChunkHead, Connections, Counts, NoRecord, RecordHead};
+use crate::bag::chunked::{ChunkHead, Connections, Counts, MessageHead, NoRecord, RecordHead};
 use crate::bag::decompress::Compression;
 use crate::bag::model::{Connection, Encoding};
 use crate::bag::source::ByteStream;
@@ -179,11 +179,11 @@ fn message(stream: &mut ByteStream<'_>, len: u64) -> Result<RecordHead<Described
     };
     let size = size.ok_or(NoRecord::Broken)?;
     stream.advance(MESSAGE_HEAD);
-    Ok(RecordHead::Message {
+    Ok(RecordHead::Message(MessageHead {
         raw: u32::from(raw),
         time: Stamp::from_nanos(time),
         size,
-    })
+    }))
 }
 
 /// The most bytes that unknown fields at the end of a record may take; with more, a length is damaged.

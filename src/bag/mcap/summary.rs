@@ -211,7 +211,7 @@ fn gaps(source: &FileSource, plan: &ChunkPlan) -> Result<(), Unindexed> {
         walk(&mut stream, start, |stream| {
             let record = Mcap::next(stream)?;
             hidden |= matches!(record, RecordHead::Chunk(_) | RecordHead::Index { .. });
-            loose |= matches!(record, RecordHead::Message { .. });
+            loose |= matches!(record, RecordHead::Message(_));
             pass(stream, record.len())
         });
         if hidden {

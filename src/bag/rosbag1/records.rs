@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Described, Rosbag1};
-use crate::bag::chunked::{ChunkHead, Counts, NoRecord, RecordHead};
+use crate::bag::chunked::{ChunkHead, Counts, MessageHead, NoRecord, RecordHead};
 use crate::bag::decompress::Compression;
 use crate::bag::model::Connection;
 use crate::bag::source::ByteStream;
@@ -56,7 +56,7 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
     let len = u64::from(len);
     Ok(match header {
         Header::Chunk { compression, size } => RecordHead::Chunk(chunk(&compression, size, len)),
-        Header::Message { raw, time } => RecordHead::Message { raw, time, size },
+        Header::Message { raw, time } => RecordHead::Message(MessageHead { raw, time, size }),
         Header::Connection { raw, topic } => RecordHead::Description {
             what: Described { raw, topic },
             len,

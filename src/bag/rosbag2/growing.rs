@@ -14,7 +14,8 @@ use crate::base::error::Result;
 const QUIET: u32 = 8;
 
 /// A folder's storage files, each with its read position.
-struct GrowingFolder {
+#[derive(Default)]
+pub(super) struct GrowingFolder {
     path: PathBuf,
     parts: Vec<Part>,
     /// The files found so far, including those that cannot be followed.
@@ -28,21 +29,6 @@ struct Part {
     file: Box<dyn Growing>,
     connections: PartConnections,
     is_over: bool,
-}
-
-/// Follows a folder.
-#[expect(
-    clippy::unnecessary_wraps,
-    reason = "the signature that all formats share"
-)]
-pub(super) fn follow(path: &Path) -> Result<Box<dyn Growing>> {
-    Ok(Box::new(GrowingFolder {
-        path: path.to_owned(),
-        parts: Vec::new(),
-        seen: BTreeSet::new(),
-        joined: Joined::default(),
-        quiet: 0,
-    }))
 }
 
 impl Growing for GrowingFolder {
@@ -76,6 +62,13 @@ impl Growing for GrowingFolder {
 }
 
 impl GrowingFolder {
+    pub(super) fn new(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            ..Self::default()
+        }
+    }
+
     /// Finds new storage files. One that cannot be followed yet is retried.
     fn find(&mut self) {
         for file in storage(&self.path) {

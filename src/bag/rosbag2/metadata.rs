@@ -6,7 +6,7 @@ use std::io::Read as _;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use crate::bag::folder::is_spare;
+use crate::bag::folder::{is_spare, is_storage};
 use crate::base::budget::YAML;
 use crate::base::file::with_suffix;
 use crate::base::yaml::{self, Value};
@@ -135,12 +135,4 @@ pub(super) fn is_inside(folder: &Path, file: &Path) -> bool {
 /// The notice about a link that leads out of the folder.
 pub(super) fn leads_out(name: &str) -> String {
     format!("`{name}` is a link out of the folder and was not followed")
-}
-
-/// Whether a file has the name of a storage file.
-pub(super) fn is_storage(path: &Path) -> bool {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let name = name.strip_suffix(".zstd").unwrap_or(&name);
-    let end = Path::new(name).extension();
-    end.is_some_and(|e| e == "db3" || e == "mcap")
 }

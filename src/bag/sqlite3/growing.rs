@@ -19,7 +19,7 @@ use crate::base::file::with_suffix;
 const EVERY: u32 = 4;
 
 /// A database, read up to the last reported row.
-struct GrowingDb {
+pub(super) struct GrowingDb {
     path: PathBuf,
     /// The sizes and times of change of the database and its log when it was last read.
     seen: Vec<(u64, Option<SystemTime>)>,
@@ -30,19 +30,16 @@ struct GrowingDb {
     wants: Vec<Want>,
 }
 
-/// Follows a database.
-#[expect(
-    clippy::unnecessary_wraps,
-    reason = "the signature that all formats share"
-)]
-pub(super) fn follow(path: &Path) -> Result<Box<dyn Growing>> {
-    Ok(Box::new(GrowingDb {
-        path: path.to_owned(),
-        seen: Vec::new(),
-        looks: EVERY,
-        next: i64::MIN,
-        wants: Vec::new(),
-    }))
+impl GrowingDb {
+    pub(super) fn new(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            seen: Vec::new(),
+            looks: EVERY,
+            next: i64::MIN,
+            wants: Vec::new(),
+        }
+    }
 }
 
 impl Growing for GrowingDb {

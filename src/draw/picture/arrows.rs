@@ -189,20 +189,7 @@ impl ArrowPath {
 }
 
 impl GraphPen<'_> {
-    /// One arrow in one window, with its ends in that window.
-    pub(crate) fn arrow(
-        &self,
-        arrow: &Arrow,
-        track: &ArrowPath,
-        shown: &Shown,
-        ends: [Option<&Shown>; 2],
-    ) -> Group {
-        let (mut group, over) = self.arrow_parts(arrow, track, shown, ends);
-        group.pieces.extend(over.pieces);
-        group
-    }
-
-    /// Its line, and its rate and badge, which lines must not cover.
+    /// The line of an arrow in one window, and its rate and badge, which lines must not cover.
     pub(crate) fn arrow_parts(
         &self,
         arrow: &Arrow,

@@ -58,8 +58,14 @@ pub(crate) fn body(style: &Style, kind: ItemKind) -> &Body {
 
 /// The paint of a box.
 pub(crate) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
-    if shown.mark == Some(Mark::Away) {
-        return quiet_box(&style.away());
+    if let Some(quiet) = quiet(style, shown) {
+        return BoxLook {
+            fill: quiet.fill,
+            stroke: Stroke::dashed(quiet.stroke, quiet.width, &quiet.dash),
+            text: quiet.text,
+            small: (Weight::Regular, quiet.text),
+            glow: Color::NONE,
+        };
     }
     if let Some(mark) = shown.mark {
         let change = change(style, mark);
@@ -71,34 +77,31 @@ pub(crate) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
             glow: glow(change, shown),
         };
     }
-    let quiet = match (shown.state, shown.confidence) {
-        (State::Declared, _) | (_, Confidence::Declared) => &style.declared,
-        (State::Silent, _) => &style.silent,
-        (State::Active | State::Latched, confidence) => {
-            let dash: &[f64] = if confidence == Confidence::Inferred {
-                &style.inferred.dash
-            } else {
-                &[]
-            };
-            return BoxLook {
-                fill: body.fill,
-                stroke: Stroke::dashed(body.stroke, body.width, dash),
-                text: body.text,
-                small: (Weight::Regular, style.page.quiet),
-                glow: Color::NONE,
-            };
-        }
-    };
-    quiet_box(quiet)
+    BoxLook {
+        fill: body.fill,
+        stroke: Stroke::dashed(body.stroke, body.width, dash(style, shown)),
+        text: body.text,
+        small: (Weight::Regular, style.page.quiet),
+        glow: Color::NONE,
+    }
 }
 
-fn quiet_box(quiet: &Quiet) -> BoxLook {
-    BoxLook {
-        fill: quiet.fill,
-        stroke: Stroke::dashed(quiet.stroke, quiet.width, &quiet.dash),
-        text: quiet.text,
-        small: (Weight::Regular, quiet.text),
-        glow: Color::NONE,
+/// The look of what is there without activity of its own, if a box or an arrow is; `None` for a change.
+fn quiet(style: &Style, shown: &Shown) -> Option<Quiet> {
+    match (shown.mark, shown.state, shown.confidence) {
+        (Some(Mark::Away), ..) => Some(style.away()),
+        (Some(_), ..) => None,
+        (_, State::Declared, _) | (.., Confidence::Declared) => Some(style.declared.clone()),
+        (_, State::Silent, _) => Some(style.silent.clone()),
+        _ => None,
+    }
+}
+
+/// The dashes of what is only inferred; of everything else none.
+fn dash<'a>(style: &'a Style, shown: &Shown) -> &'a [f64] {
+    match shown.confidence {
+        Confidence::Inferred => &style.inferred.dash,
+        _ => &[],
     }
 }
 
@@ -111,8 +114,13 @@ pub(crate) fn of_arrow(
 ) -> ArrowLook {
     let edge = &style.edge;
     let latched = shown.state == State::Latched;
-    if shown.mark == Some(Mark::Away) {
-        return quiet_arrow(&style.away());
+    if let Some(quiet) = quiet(style, shown) {
+        return ArrowLook {
+            stroke: Stroke::dashed(quiet.stroke, quiet.width, &quiet.dash),
+            text: quiet.text,
+            dot: false,
+            glow: Color::NONE,
+        };
     }
     if let Some(mark) = shown.mark {
         let change = change(style, mark);
@@ -130,37 +138,15 @@ pub(crate) fn of_arrow(
             glow: glow(change, shown),
         };
     }
-    let quiet = match (shown.state, shown.confidence) {
-        (State::Declared, _) | (_, Confidence::Declared) => Some(&style.declared),
-        (State::Silent, _) => Some(&style.silent),
-        _ => None,
-    };
-    if let Some(quiet) = quiet {
-        return quiet_arrow(quiet);
-    }
     let known = shown.steady_hz.is_some() || *kind == ArrowKind::Publish;
     let width = match shown.confidence {
         Confidence::Stated if !known => style.stated.width,
         _ => width_of(style, flow),
     };
-    let dash: &[f64] = if shown.confidence == Confidence::Inferred {
-        &style.inferred.dash
-    } else {
-        &[]
-    };
     ArrowLook {
-        stroke: Stroke::dashed(edge.stroke, width, dash),
+        stroke: Stroke::dashed(edge.stroke, width, dash(style, shown)),
         text: edge.text,
         dot: latched,
-        glow: Color::NONE,
-    }
-}
-
-fn quiet_arrow(quiet: &Quiet) -> ArrowLook {
-    ArrowLook {
-        stroke: Stroke::dashed(quiet.stroke, quiet.width, &quiet.dash),
-        text: quiet.text,
-        dot: false,
         glow: Color::NONE,
     }
 }

@@ -13,7 +13,7 @@ use crate::view::{BETWEEN_PHRASES, Frame, View, Words, joined};
 const USUAL_WIDTH: f64 = 0.5;
 /// The space between the words on the left and those on the right.
 const GAP: f64 = 24.0;
-/// The fraction of the bar that the name of the bag and the date may take.
+/// The fraction of the bar that the name of the bag and the date may take: the headline has more than half.
 const MOST_RIGHT: f64 = 0.45;
 /// The lines of text, as fractions of the bar's height.
 const LINES: (f64, f64) = (0.46, 0.82);

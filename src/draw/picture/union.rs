@@ -168,8 +168,10 @@ impl Picture<'_> {
             .map(|((((arrow, looks), track), link), marks)| {
                 let shown = plain(link.label.map(|_| 1.0));
                 let is_starved = looks.distinct().iter().any(|look| look.is_starved);
+                let (mut group, over) = pen.arrow_parts(arrow, &track, &shown, [None; 2]);
+                group.pieces.extend(over.pieces);
                 UnionElement {
-                    group: pen.arrow(arrow, &track, &shown, [None; 2]),
+                    group,
                     is_live: link.label.is_some(),
                     bar: is_starved.then(|| pen.stop(&track)),
                     badge: track.badge,

@@ -98,12 +98,13 @@ fn busiest(view: &View, most: usize) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::base::time::{Span, Stamp};
-    use crate::view::{Frame, Headline};
+    use crate::view::Frame;
+    use crate::view::testing::started;
 
     /// A view of windows 10, 11, … in which this many nodes appear.
     fn view(added: &[usize]) -> View {
         let frame = |(place, nodes_added): (usize, &usize)| Frame {
-            headlines: vec![Headline::started(); *nodes_added],
+            headlines: vec![started(); *nodes_added],
             counts: Counts {
                 nodes_added: *nodes_added,
                 ..Counts::default()

@@ -7,7 +7,8 @@ use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::Confidence;
 use crate::graph::{Element, Elements, NodeId, State};
 use crate::layout;
-use crate::view::{Frame, Headline, Item, ItemKind, Mark, Phrase, Shown, ShownRuns};
+use crate::view::testing::started;
+use crate::view::{Frame, Item, ItemKind, Mark, Phrase, Shown, ShownRuns};
 
 /// Four minutes in which one node exists and another appears and vanishes.
 fn two_nodes() -> (Mission, View) {
@@ -45,7 +46,7 @@ fn two_nodes() -> (Mission, View) {
         ..Shown::plain(id, State::Active, Confidence::Measured)
     };
     let frame = |(index, mark): (usize, Option<Mark>)| Frame {
-        headlines: mark.map(|_| Headline::started()).into_iter().collect(),
+        headlines: mark.map(|_| started()).into_iter().collect(),
         caption: mark
             .map(|m| Phrase {
                 sign: ' ',

@@ -20,9 +20,9 @@ const BURST: i64 = 66;
 /// The number of parts of the mission that make the grid on which ends are compared, and within which starts, or ends,
 /// of joined rows are one: about the width of a mark.
 const NEAR: i64 = 33;
-/// The least number of constant rows that are collapsed.
+/// The least number of constant rows that are collapsed: of two, it would save a single row.
 const FEWEST_FOLDED: usize = 3;
-/// The most rows that are drawn separately in a figure without starts and stops.
+/// The most rows that are drawn separately in a figure without starts and stops: 33 mm of bars that all look the same.
 const MOST_OPEN: usize = 12;
 /// The name of the row for events without their own row.
 const OTHERS: &str = "other changes";

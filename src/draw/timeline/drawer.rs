@@ -28,9 +28,9 @@ const TICK: f64 = 2.24 / 2.75;
 /// millimetres.
 const LETTER: f64 = 1.08 / 2.75;
 const APART: f64 = 2.3;
-/// The least width of a page with a column beside the rows, in millimetres.
+/// The least width of a page with a column beside the rows, in millimetres: a page of a journal (181 mm), not its column (88 mm).
 const WIDE: f64 = 150.0;
-/// The least share of a page that the time takes beside the types of topics.
+/// The least share of a page that the time takes beside the types of topics: with less, the types are left out, as the page is about times.
 const LEAST_TIME: f64 = 0.45;
 /// The most names that are written for a row, and beside it.
 const MOST_NAMES: (usize, usize) = (3, 12);

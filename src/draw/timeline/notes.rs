@@ -20,7 +20,7 @@ pub(crate) type Unbroken = Vec<TextRun>;
 /// The most bytes of a text that is measured as a whole: no line fits a longer one.
 const LONG: usize = 2000;
 
-/// The space between items in millimetres.
+/// The space between items in millimetres: as high as the text, so that it is more than a space between words.
 const GAP: f64 = 2.6;
 
 /// Writes items one after another from `y`, the top, on; wraps before an item that does not fit, and inside one that is

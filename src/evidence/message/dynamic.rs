@@ -185,17 +185,18 @@ impl MessageSchema {
         kind: &str,
         depth: usize,
     ) -> PayloadResult<MessageValue> {
+        let whole = |number: i128| Ok(MessageValue::Number(Some(number)));
         match kind {
             "string" => payload
                 .string()
                 .map(|text| MessageValue::Text(text.to_owned())),
             "byte" => payload.u8().map(MessageValue::Byte),
-            "int16" => whole(payload.u16()?.cast_signed()),
-            "uint16" => whole(payload.u16()?),
-            "int32" => whole(payload.u32()?.cast_signed()),
-            "uint32" => whole(payload.u32()?),
-            "int64" => whole(payload.i64()?),
-            "uint64" => whole(payload.u64()?),
+            "int16" => whole(payload.u16()?.cast_signed().into()),
+            "uint16" => whole(payload.u16()?.into()),
+            "int32" => whole(payload.u32()?.cast_signed().into()),
+            "uint32" => whole(payload.u32()?.into()),
+            "int64" => whole(payload.i64()?.into()),
+            "uint64" => whole(payload.u64()?.into()),
             "float32" => payload.u32().map(|_| MessageValue::Number(None)),
             "float64" => payload.u64().map(|_| MessageValue::Number(None)),
             _ => {
@@ -208,14 +209,6 @@ impl MessageSchema {
             }
         }
     }
-}
-
-#[expect(
-    clippy::unnecessary_wraps,
-    reason = "a match arm beside others that may fail"
-)]
-fn whole(number: impl Into<i128>) -> PayloadResult<MessageValue> {
-    Ok(MessageValue::Number(Some(number.into())))
 }
 
 /// A message layout.

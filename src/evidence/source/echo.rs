@@ -301,7 +301,8 @@ fn observe(
 // Texts that come with messages. For example, `/walker` logs `speed: 0.2` 24 times, numbers aside, and each time a message of
 // `/cmd_vel`, which has no others, follows within milliseconds: `/walker` publishes it.
 
-/// The longest time between a text and its message, in nanoseconds.
+/// The longest time between a text and its message, in nanoseconds: half the interval of 10 Hz. With more, any text would be beside
+/// a message of such a topic.
 const BESIDE_NS: i64 = 50_000_000;
 /// The fewest texts of one form that are significant, and the shares, in per cent, of the texts and of the messages that must come
 /// together: 7 topics in public recordings and missions, each of this publisher; with fewer, two timers may agree by chance.

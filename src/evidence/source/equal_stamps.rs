@@ -106,12 +106,9 @@ pub(crate) fn age(context: &mut SourceContext<'_>, header: FirstHeader, first_by
 pub(crate) fn collect(context: &mut SourceContext<'_>, header: FirstHeader, first_bytes: &[u8]) {
     let encoding = &context.stream.connection.encoding;
     if let (Some(stamp), Some(time)) = (stamp(encoding, header, first_bytes), context.time) {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "the value modulo 2^32 is intended"
-        )]
-        let units = time.0.div_euclid(UNIT_NS) as u32;
+        // Modulo 2^32, so that it fits.
+        let units = time.0.div_euclid(UNIT_NS).rem_euclid(1 << 32);
+        let units = u32::try_from(units).unwrap_or(u32::MAX);
         context.facts.header(context.place, stamp, units);
     }
 }

@@ -304,7 +304,7 @@ pub(crate) fn conclude_found(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
-/// The fewest topics that a recorder finds again when it starts.
+/// The fewest topics that a recorder finds again when it starts: one or two may be those of a node that started.
 const FEWEST_AGAIN: usize = 3;
 
 pub(crate) fn read_links(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {

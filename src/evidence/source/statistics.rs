@@ -46,7 +46,6 @@ pub(crate) fn read(
         publisher: from,
         subscriber: to,
         span: Span::new(start, end),
-        is_rolling: false,
         delivered: count(delivered),
         count: count(delivered).unwrap_or(0),
         drops: count(dropped),
@@ -54,6 +53,7 @@ pub(crate) fn read(
         jitter_ns: Some(jitter).filter(|_| period > 0),
         // Messages without a header have no age.
         age_ns: Some(age).filter(|_| oldest != 0),
+        ..Measurement::default()
     });
     for (publishes, node) in [(true, from), (false, to)] {
         if let Some(node) = node {
@@ -132,10 +132,8 @@ pub(crate) fn read_monitor(
             is_rolling: true,
             delivered: Some(periods).filter(|_| nanos > 0),
             count: ages,
-            drops: None,
-            bytes: None,
-            jitter_ns: None,
             age_ns: Some(age).filter(|_| ages > 0),
+            ..Measurement::default()
         });
     }
     Ok(())
@@ -183,17 +181,13 @@ pub(crate) fn read_metrics(
         };
         let count = cast::to_u64(numbers[SAMPLES]);
         context.measure(Measurement {
-            topic: None,
-            publisher: None,
             subscriber: Some(name),
             span,
-            is_rolling: false,
             delivered: Some(count).filter(|_| metric == "message_period"),
             count,
-            drops: None,
-            bytes: None,
             jitter_ns: nanos(numbers[DEVIATION]).filter(|_| metric == "message_period"),
             age_ns: nanos(numbers[AVERAGE]).filter(|_| metric == "message_age"),
+            ..Measurement::default()
         });
     }
     Ok(())

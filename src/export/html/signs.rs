@@ -11,22 +11,10 @@ use crate::draw::timeline::marks::Sign;
 use crate::graph::State;
 use crate::view::{Mark, View};
 
-const MARKS: [Mark; 9] = [
-    Mark::Added,
-    Mark::Removed,
-    Mark::Faster,
-    Mark::Slower,
-    Mark::HandedOver,
-    Mark::Restarted,
-    Mark::Paused,
-    Mark::Changed,
-    Mark::Inside,
-];
-
 /// Writes the definitions of all badges, as a comparison of two windows may need one that no window shows.
 pub(super) fn badges(xml: &mut Xml, style: &Style) {
     xml.open("defs");
-    for mark in MARKS {
+    for mark in Mark::BADGED {
         badge_shapes(xml, style, mark);
     }
     xml.close();

@@ -18,60 +18,32 @@ pub(super) struct Table {
 
 type Column<R> = ColumnOf<Mission, R>;
 
+/// A table with these columns and a row for each of these.
+macro_rules! table {
+    ($word:literal, $columns:ident, $mission:ident => $rows:expr) => {
+        Table {
+            word: $word,
+            batch: || Batch::with($columns),
+            fill: |$mission, row| {
+                for one in $rows {
+                    let cells = $columns.iter().map(|column| (column.cell)($mission, &one));
+                    row(&cells.collect::<Vec<_>>());
+                }
+            },
+        }
+    };
+}
+
 /// All tables of a mission.
 pub(super) const TABLES: &[Table] = &[
-    Table {
-        word: "edges",
-        batch: || Batch::with(EDGES),
-        fill: |all, row| elements(all, Element::is_edge, EDGES, row),
-    },
-    Table {
-        word: "topics",
-        batch: || Batch::with(TOPICS),
-        fill: |all, row| elements(all, Element::is_topic, TOPICS, row),
-    },
-    Table {
-        word: "nodes",
-        batch: || Batch::with(NODES),
-        fill: |all, row| elements(all, Element::is_node, NODES, row),
-    },
-    Table {
-        word: "changes",
-        batch: || Batch::with(CHANGES),
-        fill: |all, row| {
-            for (at, window) in all.windows.iter().enumerate() {
-                let changes = window.changes.iter();
-                changes.for_each(|one| put(all, CHANGES, &(at, one.clone()), row));
-            }
-        },
-    },
-    Table {
-        word: "events",
-        batch: || Batch::with(EVENTS),
-        fill: |all, row| {
-            let ids = all.log.events.ids();
-            ids.for_each(|id| put(all, EVENTS, &id, row));
-        },
-    },
-    Table {
-        word: "phases",
-        batch: || Batch::with(PHASES),
-        fill: |all, row| (0..all.log.phases.len()).for_each(|at| put(all, PHASES, &at, row)),
-    },
-    Table {
-        word: "bags",
-        batch: || Batch::with(BAGS),
-        fill: |all, row| (0..all.bags.len()).for_each(|at| put(all, BAGS, &at, row)),
-    },
+    table!("edges", EDGES, all => elements(all, Element::is_edge)),
+    table!("topics", TOPICS, all => elements(all, Element::is_topic)),
+    table!("nodes", NODES, all => elements(all, Element::is_node)),
+    table!("changes", CHANGES, all => changes(all)),
+    table!("events", EVENTS, all => all.log.events.ids()),
+    table!("phases", PHASES, all => 0..all.log.phases.len()),
+    table!("bags", BAGS, all => 0..all.bags.len()),
 ];
-
-fn put<R>(mission: &Mission, columns: &[Column<R>], one: &R, row: RowTaker<'_>) {
-    let cells: Vec<_> = columns
-        .iter()
-        .map(|column| (column.cell)(mission, one))
-        .collect();
-    row(&cells);
-}
 
 /// The columns of a table of elements, including those common to all such tables.
 macro_rules! of_elements {
@@ -130,38 +102,28 @@ element_columns! {
 }
 
 /// The elements of a kind in each window.
-fn elements(
-    all: &Mission,
-    is_kind: fn(&Element) -> bool,
-    columns: &[Column<Seen>],
-    row: RowTaker<'_>,
-) {
+fn elements(all: &Mission, is_kind: fn(&Element) -> bool) -> impl Iterator<Item = Seen> {
     let skews = all.skews();
-    for (window, graph) in all.each() {
-        // Of nodes, which come first.
-        let has_loads = is_kind(&Element::Node(NodeId::of(0)));
+    // Of nodes, which come first.
+    let has_loads = is_kind(&Element::Node(NodeId::of(0)));
+    all.each().flat_map(move |(window, graph)| {
         let loads = has_loads.then(|| graph.loads(&all.elements));
-        let mut loads = loads.into_iter().flatten();
-        for state in graph.states {
-            let load = loads.next();
-            if !is_kind(&state.what) {
-                continue;
-            }
-            let skew = match state.what {
+        let loads = loads.into_iter().flatten().map(Some);
+        let states = graph.states.into_iter();
+        let states = states.zip(loads.chain(std::iter::repeat(None)));
+        let seen = states.map(|(state, load)| Seen {
+            win: window.index,
+            span: window.span,
+            skew: match state.what {
                 Element::Topic(id) => skews.get(id).copied().flatten(),
                 _ => None,
-            };
-            let (win, span) = (window.index, window.span);
-            let one = Seen {
-                win,
-                span,
-                state,
-                skew,
-                load,
-            };
-            put(all, columns, &one, row);
-        }
-    }
+            },
+            state,
+            load,
+        });
+        let seen = seen.filter(|one| is_kind(&one.state.what));
+        seen.collect::<Vec<_>>()
+    })
 }
 
 /// An element in a window.
@@ -191,6 +153,11 @@ fn topic_of<'a>(mission: &'a Mission, one: &Seen) -> Option<&'a Topic> {
 
 /// A change, and the index of its window.
 type WindowChange = (usize, Change);
+
+fn changes(all: &Mission) -> impl Iterator<Item = WindowChange> {
+    let windows = all.windows.iter().enumerate();
+    windows.flat_map(|(at, window)| window.changes.iter().map(move |one| (at, one.clone())))
+}
 
 const CHANGES: &[Column<WindowChange>] = columns! {
     "win" I64 |all, one| TableCell::count(all.windows[one.0].index);

@@ -148,7 +148,7 @@ fn constant_states_take_no_memory() {
         states: vec![topic],
     };
     let all: Graphs = (0..100_000).map(|n| (second(n), graph.clone())).collect();
-    assert!(all.columns.0[1][0].len() < 32, "{:?}", all.columns);
+    assert!(all.columns.0[1][0].bytes.len() < 32, "{:?}", all.columns);
 }
 
 #[test]

@@ -124,7 +124,8 @@ fn sent(what: Element, graphs: &Graphs) -> Vec<Sent> {
     all
 }
 
-/// The most messages by which two windows of one rate differ, since their edges fall between messages.
+/// The most messages by which two windows of one rate differ, since their edges fall between messages: one more or less in each of
+/// them, and a little for the rounding of rates.
 const JITTER: f64 = 2.2;
 
 /// The stretches of a sender: consecutive windows with about the same rate are one.

@@ -19,7 +19,7 @@ use crate::layout::{
 
 /// The shapes, width over height, of the pages on which the contents of namespaces are laid out: columns, squares, rows.
 const SHAPES: [f64; 3] = [0.3, 1.0, 3.0];
-/// The straight pieces that stand for each curve of a route when crossings are counted.
+/// The straight pieces that stand for each curve of a route when crossings are counted: with six, no drawing has fewer.
 const PIECES: u32 = 3;
 
 /// The part with its outermost namespaces as blocks, in the way that is judged best, and its quality: with all contents

@@ -315,6 +315,7 @@ impl<'a> CrossingReducer<'a> {
 
     /// Swaps neighbours in a row while that saves crossings.
     pub(crate) fn transpose(&mut self) {
+        // Once: 1.6 % fewer labels have a place; six times: no fewer crossings.
         for _ in 0..3 {
             let mut better = false;
             for rank in 0..self.layers.ranks {

@@ -6,10 +6,12 @@ use super::crossings::CrossingReducer;
 use crate::layout::{LayerRows, Layers};
 
 /// The largest number of sweeps of one order, and the number of sweeps without improvement after which it is
-/// abandoned.
+/// abandoned. Half as many sweeps: drawings are 0.6 % smaller; twice as many: no drawing changes. Half the patience: 0.8 % fewer
+/// labels have a place; twice: no fewer crossings in 1.17 times the time (`tests/bench/layout.md`, as all numbers in this folder).
 const SWEEPS: usize = 24;
 const PATIENCE: usize = 6;
-/// The largest number of times that the best order is perturbed.
+/// The largest number of times that the best order is perturbed. Never: 2 % more crossings; twice as often: 1.5 % fewer;
+/// until the effort is spent: 11 % fewer, in drawings that are 0.6 % smaller and take 1.25 times as long.
 const SHAKES: usize = 8;
 
 /// An order of the items in each layer, and its number of crossings, borders of clusters included.
@@ -133,6 +135,8 @@ impl<'a> Search<'a> {
                 0.0
             }
         };
+        // One cluster in three and one item in twenty: 2 to 3 % more crossings without either; half and twice as many are as
+        // good, within chance.
         let shift: Vec<f64> = self.layers.parent.iter().map(|_| throw(0.3)).collect();
         let mut key = vec![0.0; self.layers.rank.len()];
         for row in &rows {

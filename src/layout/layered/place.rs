@@ -5,17 +5,49 @@ use std::ops::Range;
 use crate::layout::isotonic::Monotone;
 use crate::layout::{LayerItem, LayerRows, Layers};
 
-/// The number of times that all layers are placed.
+/// The number of times that all layers are placed. With ten, edges have 1.5 % more bends; with 20 or 80, nothing differs by more.
 const SWEEPS: usize = 40;
-/// The sweep from which items are pulled to both sides, and the one from which bends follow one side only.
-const BOTH: usize = 6;
-const LAST: usize = 100;
+/// The number of the first sweeps, in which every item follows the layer placed before. Without them, edges are 0.3 % longer; half
+/// or twice as many change next to nothing.
+const FOLLOWING: usize = 6;
+/// The number of sweeps between the borders, once these do not move any more: half or twice as many change next to nothing.
+const INSIDE: usize = 8;
+/// The number of the last sweeps, in which bends follow the layer before: an edge bends where it begins.
+const LAST: usize = 3;
+
+/// A placement of all layers, one after the other.
+#[derive(Clone, Copy)]
+struct Sweep {
+    /// Whether it begins with the first layer; otherwise with the last.
+    is_down: bool,
+    followers: Followers,
+}
+
+/// The items that follow the layer placed before; the others are pulled to the layers on both sides.
+#[derive(Clone, Copy)]
+enum Followers {
+    All,
+    Bends,
+    None,
+}
+
+impl Sweep {
+    /// The sweep at this index, of those that go down and up in turn.
+    fn nth(nth: usize, followers: Followers) -> Self {
+        Self {
+            is_down: nth.is_multiple_of(2),
+            followers,
+        }
+    }
+}
 
 /// The middle of each item across, for rows whose neighbours have these minimum distances.
 pub(crate) fn place(layers: &Layers, rows: &LayerRows, apart: &[Vec<f64>]) -> Vec<f64> {
     let mut table = Table::new(layers, rows, apart);
     table.pack();
-    for sweep in 0..SWEEPS {
+    let first = (0..FOLLOWING).map(|nth| Sweep::nth(nth, Followers::All));
+    let rest = (FOLLOWING..SWEEPS).map(|nth| Sweep::nth(nth, Followers::None));
+    for sweep in first.chain(rest) {
         for rank in table.ranks(sweep) {
             table.place_together(table.row(rank), sweep, |_, place| place);
         }
@@ -123,10 +155,10 @@ impl<'a> Table<'a> {
     }
 
     /// The rows in the direction of a sweep.
-    fn ranks(&self, sweep: usize) -> impl Iterator<Item = usize> + use<> {
+    fn ranks(&self, sweep: Sweep) -> impl Iterator<Item = usize> + use<> {
         let ranks = self.start.len() - 1;
         (0..ranks).map(move |step| {
-            if sweep.is_multiple_of(2) {
+            if sweep.is_down {
                 step
             } else {
                 ranks - 1 - step
@@ -139,7 +171,7 @@ impl<'a> Table<'a> {
     fn place_together(
         &mut self,
         together: Range<usize>,
-        sweep: usize,
+        sweep: Sweep,
         limits: impl Fn(f64, f64) -> f64,
     ) {
         let mut monotone = std::mem::take(&mut self.monotone);
@@ -156,15 +188,17 @@ impl<'a> Table<'a> {
     }
 
     /// The goal of an item, and the weight of that goal.
-    fn goal(&self, at: usize, sweep: usize) -> (f64, f64) {
-        let is_bend = || self.layers.kind[self.items[at]] == LayerItem::Bend;
+    fn goal(&self, at: usize, sweep: Sweep) -> (f64, f64) {
+        let follows = match sweep.followers {
+            Followers::All => true,
+            Followers::Bends => self.layers.kind[self.items[at]] == LayerItem::Bend,
+            Followers::None => false,
+        };
         let ((before, after), end) = (self.first[at], self.first[at + 1].0);
-        let near = if sweep >= BOTH && (sweep < LAST || !is_bend()) {
-            before..end
-        } else if sweep.is_multiple_of(2) {
-            before..after
-        } else {
-            after..end
+        let near = match (follows, sweep.is_down) {
+            (false, _) => before..end,
+            (true, true) => before..after,
+            (true, false) => after..end,
         };
         let (mut sum, mut pull) = (0.0, 0.0);
         for &(other, weight) in &self.pulls[near] {
@@ -174,6 +208,7 @@ impl<'a> Table<'a> {
         if pull > 0.0 {
             (sum / pull, pull)
         } else {
+            // It stays, unless others need the place.
             (self.across[at], 0.05)
         }
     }
@@ -258,7 +293,9 @@ impl<'a> Table<'a> {
             }
             stretches.push(inside);
         }
-        for sweep in (BOTH..14).chain([LAST, LAST + 2, LAST + 4]) {
+        let inside = (0..INSIDE).map(|nth| Sweep::nth(nth, Followers::None));
+        let last = (0..LAST).map(|_| Sweep::nth(0, Followers::Bends));
+        for sweep in inside.chain(last) {
             for rank in self.ranks(sweep) {
                 for stretch in &stretches[rank] {
                     let total = self.offset[stretch.end - 1];
@@ -284,7 +321,9 @@ impl<'a> Table<'a> {
     }
 }
 
-/// The weight with which two linked items are aligned: highest for bends, so that long edges are straight.
+/// The weight with which two linked items are aligned: highest for the borders of a cluster, then for bends, so that long edges are
+/// straight. Half or twice the weight at an end: 4 or 2.5 % more crossings; half or twice that of bends or borders: less than 1 % of
+/// difference.
 fn stiffness(a: LayerItem, b: LayerItem) -> f64 {
     match (a, b) {
         (LayerItem::Vertex, LayerItem::Vertex) => 1.0,

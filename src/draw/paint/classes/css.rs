@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use crate::draw::scene::Stroke;
 use crate::draw::style::{Body, Change, Color, Quiet, Style};
-use crate::view::{STEPS, decades};
+use crate::view::{Mark, STEPS, decades};
 
 /// The rules of the graph in every window: [`base`], then [`states`].
 pub(crate) fn rules(style: &Style, words: &BTreeSet<&str>) -> String {
@@ -73,7 +73,8 @@ fn states(style: &Style, words: &BTreeSet<&str>) -> String {
     if words.contains("away") {
         self::quiet(&mut out, "away", &style.away());
     }
-    let badges = MARKS.iter().filter(|word| words.contains(*word));
+    let badges = Mark::BADGED.map(Mark::badge).into_iter();
+    let badges = badges.filter(|word| words.contains(word));
     let mut shown: Vec<String> = badges.map(|word| format!(".{word}>.{word}")).collect();
     shown.push(":is(.faster,.slower)>.c,.latched:not(.removed,.edge)>.l,.starved>.l".to_owned());
     let _ = write!(out, "{}{{visibility:inherit}}", shown.join(","));
@@ -82,19 +83,6 @@ fn states(style: &Style, words: &BTreeSet<&str>) -> String {
     }
     out
 }
-
-/// The class words of badges.
-const MARKS: [&str; 9] = [
-    "added",
-    "removed",
-    "faster",
-    "slower",
-    "handed-over",
-    "restarted",
-    "paused",
-    "other",
-    "inside",
-];
 
 const FONT: &str = "Inter,Helvetica,Arial,sans-serif";
 
