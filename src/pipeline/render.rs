@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::compose::Composed;
 use super::fit::{LARGEST, fitted};
 use super::unfolded::Opened;
-use super::{Body, Drawing, Reading, Stage, Watch, figure, read};
+use super::{Body, Drawing, Medium, Reading, Stage, Watch, figure, read};
 use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
@@ -312,6 +312,14 @@ impl<'a> Showing<'a> {
             let most = most_rows(self.drawing.page.size.h);
             let rows = together(&source, rows.clone(), most, false);
             self.drawing.page.timeline = Timeline::named(&source, rows);
+        }
+        let has_strip = job
+            .sequence
+            .strip
+            .as_ref()
+            .filter(|_| !self.drawing.is_sized);
+        if let Some(many) = has_strip.map(Choice::columns).filter(|many| *many > 1) {
+            self.drawing = self.drawing.clone().on(Medium::panel(many));
         }
         let composed = if is_drawn {
             fitted(mission, &self.drawing, watch)

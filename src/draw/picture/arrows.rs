@@ -197,19 +197,20 @@ impl GraphPen<'_> {
         shown: &Shown,
         ends: [Option<&Shown>; 2],
     ) -> Group {
-        let (mut group, over) = self.arrow_parts(arrow, track, shown, ends);
+        let [glow, mut group, over] = self.arrow_parts(arrow, track, shown, ends);
+        group.pieces.splice(..0, glow.pieces);
         group.pieces.extend(over.pieces);
         group
     }
 
-    /// Its line, and its rate and badge, which lines must not cover.
+    /// Its glow, which belongs below all lines, its line, and its rate and badge, which lines must not cover.
     pub(crate) fn arrow_parts(
         &self,
         arrow: &Arrow,
         track: &ArrowPath,
         shown: &Shown,
         ends: [Option<&Shown>; 2],
-    ) -> (Group, Group) {
+    ) -> [Group; 3] {
         let look = options::of_arrow(self.style, &arrow.kind, shown, shown.steady_hz);
         let [from, to] = &track.ends;
         let kind = arrow.kind.word();
@@ -227,16 +228,18 @@ impl GraphPen<'_> {
             id: format!("{}..over", group.id),
             ..group.clone()
         };
+        let glow = Group::new(format!("{}..glow", group.id), "glow");
+        let mut glow = glow.with(vec![("of", group.id.clone())]);
         let tip = match arrow.kind {
             _ if shown.is_starved => Tip::Stop,
             ArrowKind::Bundle | ArrowKind::Direct(_) if arrow.is_service => Tip::Service,
             _ => Tip::Arrow,
         };
         if arrow.kind == ArrowKind::Bundle {
-            self.line(&mut group, track, &look, tip, shown.ways());
+            self.line([&mut glow, &mut group], track, &look, tip, shown.ways());
             self.rows(&mut over, track, shown, &look);
         } else {
-            self.line(&mut group, track, &look, tip, [true, false]);
+            self.line([&mut glow, &mut group], track, &look, tip, [true, false]);
         }
         // A rate that changed is shown even where there is no space beside the line, unless its topic shows it.
         let is_at_end = ends.into_iter().flatten().any(Shown::has_new_rate);
@@ -249,7 +252,7 @@ impl GraphPen<'_> {
             let size = self.fit.pen * 0.8;
             badge::badge(&mut over, self.style, mark, track.badge, size);
         }
-        (group, over)
+        [glow, group, over]
     }
 
     /// The bar at the end of a line of ordinary width through which nothing arrives.
@@ -259,10 +262,10 @@ impl GraphPen<'_> {
         Tip::Stop.form(tip, along, (edge.arrow + edge.width) * self.fit.pen)
     }
 
-    /// The line with a head at its end and at its start, according to `heads`.
+    /// The line, and its glow, with a head at its end and at its start, according to `heads`.
     fn line(
         &self,
-        group: &mut Group,
+        [glow, group]: [&mut Group; 2],
         track: &ArrowPath,
         look: &ArrowLook,
         kind: Tip,
@@ -300,7 +303,7 @@ impl GraphPen<'_> {
         let path = Form::Path(steps);
         if look.glow != Color::NONE {
             let width = stroke.width + 1.2 * self.style.badge.glow * scale;
-            group.shape(Shape::line(path.clone(), Stroke::solid(look.glow, width)));
+            glow.shape(Shape::line(path.clone(), Stroke::solid(look.glow, width)));
         }
         group.shape(Shape::line(path, stroke));
         let tips = [(end, along), (track.route.start, against)];
