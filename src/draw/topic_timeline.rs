@@ -20,6 +20,7 @@ use crate::draw::timeline::rows::{Row, of_topics};
 use crate::draw::timeline::source::FigureSource;
 
 use crate::graph::{Element, ElementState, NodeId};
+use crate::mission::event_log::Kind;
 use crate::view::{Frame, View};
 
 /// The least and the largest number of pixels per millimetre of the drawing, so that small text has at least
@@ -177,7 +178,7 @@ impl<'a> TopicTimeline<'a> {
         canvas.begin("nodes");
         let alive = graph.iter().flat_map(|g| g.nodes().map(|(id, _)| id));
         let alive: BTreeSet<NodeId> = alive.collect();
-        self.nodes(&mut canvas, &|id| !is_window || alive.contains(id));
+        self.nodes(&mut canvas, frame, &|id| !is_window || alive.contains(id));
         canvas.begin("why");
         let wide = self.options.size.w / self.scale - 2.0 * self.drawer.left;
         let why = self.why();
@@ -220,24 +221,52 @@ impl<'a> TopicTimeline<'a> {
         }
     }
 
-    /// Writes as many of the known nodes as fit; those that are in the window, if it is one.
-    fn nodes(&self, canvas: &mut PaperCanvas<'_>, is_there: &dyn Fn(&NodeId) -> bool) {
+    /// Writes as many of the known nodes as fit: those that start, stop or restart in this window in colour, then those that
+    /// are there.
+    fn nodes(
+        &self,
+        canvas: &mut PaperCanvas<'_>,
+        frame: &Frame,
+        is_there: &dyn Fn(&NodeId) -> bool,
+    ) {
         let elements = &self.source.mission.elements;
         let is_known = |id: &NodeId| !elements.seen(Element::Node(*id)).evidence.is_guess();
-        let is_shown = |id: &NodeId| is_known(id) && is_there(id);
-        let roles = self.source.roles.iter();
-        let roles = roles.filter(|(_, nodes)| nodes.iter().any(is_shown));
-        let names: Vec<String> = roles.map(|(role, _)| role.to_string()).collect();
+        let color = |id: &NodeId| {
+            let mut news = frame.headlines.iter().rev();
+            let node = Element::Node(*id);
+            let color = |kind: Kind| match kind {
+                Kind::Started => Some(ink::ADDED),
+                Kind::Stopped => Some(ink::REMOVED),
+                Kind::Restarted => Some(ink::CHANGED),
+                _ => None,
+            };
+            let news = news.find_map(|h| color(h.kind).filter(|_| h.what == node));
+            news.or_else(|| (is_known(id) && is_there(id)).then_some(ink::TEXT))
+        };
+        let mut named =
+            [ink::ADDED, ink::REMOVED, ink::CHANGED, ink::TEXT].map(|c| (c, Vec::new()));
+        for (role, nodes) in &self.source.roles {
+            let colors = nodes.iter().filter_map(color);
+            let first = named
+                .iter_mut()
+                .find(|(c, _)| colors.clone().any(|own| own == *c));
+            if let Some((_, names)) = first {
+                names.push(role.to_string());
+            }
+        }
         let (left, title) = (self.drawer.left, "nodes known");
         let after = left + canvas.width(title, Type::Small) + 1.2;
-        let x = self.drawer.axis.left.max(after);
-        let room = self.options.size.w / self.scale - left - x;
-        let fits = |text: &str| canvas.width(text, Type::Small) <= room;
-        let text = fitting(&names, names.len(), fits);
-        if !names.is_empty() {
-            let y = self.drawer.end() + Sizes::SCREEN.line() + 2.0 + LABEL / 2.0;
+        let mut x = self.drawer.axis.left.max(after);
+        let end = self.options.size.w / self.scale - left;
+        let y = self.drawer.end() + Sizes::SCREEN.line() + 2.0 + LABEL / 2.0;
+        if named.iter().any(|(_, names)| !names.is_empty()) {
             canvas.text(left, y, Type::Small, ink::QUIET, title);
-            canvas.text(x, y, Type::Small, ink::TEXT, &text);
+        }
+        for (color, names) in named.iter().filter(|(_, names)| !names.is_empty()) {
+            let fits = |text: &str| canvas.width(text, Type::Small) <= end - x;
+            let text = fitting(names, names.len(), fits);
+            canvas.text(x, y, Type::Small, *color, &text);
+            x += canvas.width(&text, Type::Small) + 1.2;
         }
     }
 }
