@@ -30,6 +30,9 @@ use crate::mission::Mission;
 use crate::mission::phases::knows_publishers;
 use crate::view::{Grouping, Mode, View, check_filters, filtered, nothing, unmatched};
 
+/// Pixels of an image per pixel of a page on paper: 300 instead of 96 to the inch.
+const PAPER: f64 = 300.0 / 96.0;
+
 /// The whole job of `bagreel render`.
 #[derive(Clone)]
 #[non_exhaustive]
@@ -279,6 +282,10 @@ impl<'a> Showing<'a> {
 
     /// The sequence without a picture.
     fn sequence<'s>(&'s self, view: &'s View) -> Sequence<'s> {
+        let mut options = self.job.sequence.clone();
+        if self.drawing.page.width_mm.is_some() || self.kind == PictureKind::Figure {
+            options.scale *= PAPER;
+        }
         Sequence {
             mission: self.mission,
             data: self.data.as_ref().unwrap_or(self.mission),
@@ -292,7 +299,7 @@ impl<'a> Showing<'a> {
             fonts: &self.drawing.fonts,
             strip: None,
             latex: None,
-            options: self.job.sequence.clone(),
+            options,
         }
     }
 
@@ -313,12 +320,9 @@ impl<'a> Showing<'a> {
             let rows = together(&source, rows.clone(), most, false);
             self.drawing.page.timeline = Timeline::named(&source, rows);
         }
-        let has_strip = job
-            .sequence
-            .strip
-            .as_ref()
-            .filter(|_| !self.drawing.is_sized);
-        if let Some(many) = has_strip.map(Choice::columns).filter(|many| *many > 1) {
+        let is_chosen = self.drawing.is_sized || self.drawing.page.width_mm.is_some();
+        let strip = job.sequence.strip.as_ref().filter(|_| !is_chosen);
+        if let Some(many) = strip.map(Choice::columns).filter(|many| *many > 1) {
             self.drawing = self.drawing.clone().on(Medium::panel(many));
         }
         let composed = if is_drawn {
