@@ -468,11 +468,8 @@ fn tracks(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ArrowP
     let view = measured.view;
     let name = |id: ItemId| view.items.get(id).map_or("", |item| &*item.name);
     let empty = layout::Route::default();
-    let arrows = view
-        .arrows
-        .iter()
-        .zip(&measured.graph.plan.links)
-        .enumerate();
+    let arrows = view.arrows.iter();
+    let arrows = arrows.zip(&measured.graph.plan.links).enumerate();
     arrows
         .map(|(at, (arrow, link))| {
             let ends = [arrow.from, arrow.to].map(|id| name(id).to_owned());

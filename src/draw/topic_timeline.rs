@@ -233,40 +233,31 @@ impl<'a> TopicTimeline<'a> {
         let is_known = |id: &NodeId| !elements.seen(Element::Node(*id)).evidence.is_guess();
         let color = |id: &NodeId| {
             let mut news = frame.headlines.iter().rev();
-            let node = Element::Node(*id);
-            let color = |kind: Kind| match kind {
+            let news = news.find_map(|h| match h.kind {
+                _ if h.what != Element::Node(*id) => None,
                 Kind::Started => Some(ink::ADDED),
                 Kind::Stopped => Some(ink::REMOVED),
                 Kind::Restarted => Some(ink::CHANGED),
                 _ => None,
-            };
-            let news = news.find_map(|h| color(h.kind).filter(|_| h.what == node));
+            });
             news.or_else(|| (is_known(id) && is_there(id)).then_some(ink::TEXT))
         };
-        let mut named =
-            [ink::ADDED, ink::REMOVED, ink::CHANGED, ink::TEXT].map(|c| (c, Vec::new()));
-        for (role, nodes) in &self.source.roles {
-            let colors = nodes.iter().filter_map(color);
-            let first = named
-                .iter_mut()
-                .find(|(c, _)| colors.clone().any(|own| own == *c));
-            if let Some((_, names)) = first {
-                names.push(role.to_string());
-            }
-        }
-        let (left, title) = (self.drawer.left, "nodes known");
-        let after = left + canvas.width(title, Type::Small) + 1.2;
+        let (left, mut title) = (self.drawer.left, Some("nodes known"));
+        let after = left + title.map_or(0.0, |title| canvas.width(title, Type::Small)) + 1.2;
         let mut x = self.drawer.axis.left.max(after);
         let end = self.options.size.w / self.scale - left;
         let y = self.drawer.end() + Sizes::SCREEN.line() + 2.0 + LABEL / 2.0;
-        if named.iter().any(|(_, names)| !names.is_empty()) {
-            canvas.text(left, y, Type::Small, ink::QUIET, title);
-        }
-        for (color, names) in named.iter().filter(|(_, names)| !names.is_empty()) {
-            let fits = |text: &str| canvas.width(text, Type::Small) <= end - x;
-            let text = fitting(names, names.len(), fits);
-            canvas.text(x, y, Type::Small, *color, &text);
-            x += canvas.width(&text, Type::Small) + 1.2;
+        for own in [ink::ADDED, ink::REMOVED, ink::CHANGED, ink::TEXT] {
+            let roles = self.source.roles.iter();
+            let roles = roles.filter(|(_, nodes)| nodes.iter().find_map(color) == Some(own));
+            let names: Vec<String> = roles.map(|(role, _)| role.to_string()).collect();
+            if !names.is_empty() {
+                let fits = |text: &str| canvas.width(text, Type::Small) <= end - x;
+                let text = fitting(&names, names.len(), fits);
+                canvas.text(left, y, Type::Small, ink::QUIET, title.take().unwrap_or(""));
+                canvas.text(x, y, Type::Small, own, &text);
+                x += canvas.width(&text, Type::Small) + 1.2;
+            }
         }
     }
 }

@@ -1,6 +1,5 @@
 //! The options of a picture, and the medium for which it is drawn: its page, and the smallest text that is legible on it.
 
-use super::fit::LARGEST;
 use crate::base::error::Result;
 use crate::base::geometry::Size;
 use crate::base::words::worded;
@@ -117,8 +116,6 @@ const PX_PER_PT: f64 = 96.0 / 72.0;
 const NAMES: f64 = 7.0;
 /// The smallest legible text on a screen, in pixels.
 const SMALLEST: f64 = 9.0;
-/// The width of a README in pixels.
-const README: f64 = 830.0;
 /// The smallest text of the style's decorations, in its pixels.
 const DECORATIONS: f64 = 10.5;
 
@@ -142,9 +139,15 @@ pub(crate) fn printed_scale(text_pt: f64) -> f64 {
 
 impl From<Purpose> for Medium {
     fn from(purpose: Purpose) -> Self {
+        let screen = |width: f64, heights: &[f64], has_legend| Self {
+            sizes: heights.iter().map(|h| Size::new(width, *h)).collect(),
+            readable: SMALLEST,
+            paper: None,
+            has_legend,
+        };
         match purpose {
-            Purpose::Readme => Self::screen(README, &[467.0, 560.0, 680.0, 830.0, 1100.0], false),
-            Purpose::Slide => Self::screen(1280.0, &[720.0], true),
+            Purpose::Readme => screen(830.0, &[467.0, 560.0, 680.0, 830.0, 1100.0], false),
+            Purpose::Slide => screen(1280.0, &[720.0], true),
             Purpose::Column => Self::paper(88.0, NAMES),
             Purpose::Page => Self::paper(181.0, NAMES),
         }
@@ -152,21 +155,6 @@ impl From<Purpose> for Medium {
 }
 
 impl Medium {
-    fn screen(width: f64, heights: &[f64], has_legend: bool) -> Self {
-        Self {
-            sizes: heights.iter().map(|h| Size::new(width, *h)).collect(),
-            readable: SMALLEST,
-            paper: None,
-            has_legend,
-        }
-    }
-
-    /// A panel of a strip of so many columns, which share the width of a screen, but none is narrower than a README.
-    pub(crate) fn panel(columns: usize) -> Self {
-        let width = (LARGEST.w / columns as f64).max(README);
-        Self::screen(width, &[0.5, 0.75, 1.1].map(|part| part * width), false)
-    }
-
     /// Paper of this width in millimetres, with names of this size in points.
     pub(crate) fn paper(width_mm: f64, text_pt: f64) -> Self {
         let (width, most) = (width_mm * PX_PER_MM, MOST_HEIGHT * PX_PER_MM);

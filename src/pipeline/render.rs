@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::compose::Composed;
 use super::fit::{LARGEST, fitted};
 use super::unfolded::Opened;
-use super::{Body, Drawing, Medium, Reading, Stage, Watch, figure, read};
+use super::{Body, Drawing, Purpose, Reading, Stage, Watch, figure, read};
 use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
@@ -321,9 +321,9 @@ impl<'a> Showing<'a> {
             self.drawing.page.timeline = Timeline::named(&source, rows);
         }
         let is_chosen = self.drawing.is_sized || self.drawing.page.width_mm.is_some();
-        let strip = job.sequence.strip.as_ref().filter(|_| !is_chosen);
-        if let Some(many) = strip.map(Choice::columns).filter(|many| *many > 1) {
-            self.drawing = self.drawing.clone().on(Medium::panel(many));
+        if job.sequence.strip.is_some() && !is_chosen {
+            // Two such panels side by side fit a screen.
+            self.drawing = self.drawing.clone().seen(Purpose::Readme);
         }
         let composed = if is_drawn {
             fitted(mission, &self.drawing, watch)

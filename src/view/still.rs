@@ -126,22 +126,24 @@ impl StillRates<'_> {
             _ => None,
         };
         let rates: Option<Vec<_>> = members.iter().map(rates).collect();
-        let Some(((hz, steps), others)) = rates.as_deref().and_then(<[_]>::split_first) else {
+        let Some((first, others)) = rates.as_deref().and_then(<[_]>::split_first) else {
             return shown;
         };
-        let are_equal = |(other, others): &(Option<f64>, Vec<f64>)| {
-            let pairs = hz.iter().chain(steps).zip(other.iter().chain(others));
-            others.len() == steps.len() && pairs.into_iter().all(|(a, b)| are_close(*a, *b))
+        let all = |(hz, steps): &(Option<f64>, Vec<f64>)| -> Vec<f64> {
+            hz.iter().chain(steps).copied().collect()
         };
-        let is_each = others.iter().all(are_equal);
+        let (own, many) = (all(first), members.len());
+        let are_equal = |other: Vec<f64>| {
+            other.len() == own.len() && own.iter().zip(other).all(|(a, b)| are_close(*a, b))
+        };
+        if !others.iter().map(all).all(are_equal) {
+            let (hz, each) = (None, 0);
+            return Shown { hz, each, ..shown };
+        }
         Shown {
-            hz: hz.filter(|_| is_each).map(|hz| hz * members.len() as f64),
-            each: if is_each && !others.is_empty() {
-                members.len()
-            } else {
-                0
-            },
-            steps: if is_each { steps.clone() } else { Vec::new() },
+            hz: first.0.map(|hz| hz * many as f64),
+            each: if many > 1 { many } else { 0 },
+            steps: first.1.clone(),
             ..shown
         }
     }
@@ -248,10 +250,9 @@ fn add_row(sum: &mut TopicRow, row: &TopicRow) {
 
 /// The most active of two states; a single message that is latched stays so.
 fn in_both(states: [State; 2], count: Option<u64>) -> State {
-    match states.contains(&State::Latched) && count <= Some(1) {
-        true => State::Latched,
-        false => states[0].min(states[1]),
-    }
+    let is_latched = states.contains(&State::Latched) && count <= Some(1);
+    let single = is_latched.then_some(State::Latched);
+    single.unwrap_or(states[0].min(states[1]))
 }
 
 /// Marks of nodes, each with its event, as parts of the mission's time.
@@ -296,11 +297,8 @@ fn presence(item: &Item, mission: &Mission, marks: &NodeMarks) -> Presence {
 /// The number of nodes in boxes and in words; the runs of an anonymous node are one.
 fn roles(view: &View, mission: &Mission) -> usize {
     let in_words = view.also.iter().flat_map(|also| &also.items);
-    let members = view
-        .items
-        .iter()
-        .chain(in_words)
-        .flat_map(|item| &item.members);
+    let members = view.items.iter();
+    let members = members.chain(in_words).flat_map(|item| &item.members);
     let role = |what: &Element| match what {
         Element::Node(id) => mission.elements.nodes.get(*id).map(|node| &*node.role),
         _ => None,

@@ -173,12 +173,8 @@ impl ArrowPath {
         let Some([first, second, end]) = self.route.curves.last().copied() else {
             return (self.route.start, direction(&[], self.route.start));
         };
-        let before = self
-            .route
-            .curves
-            .iter()
-            .nth_back(1)
-            .map_or(self.route.start, |c| c[2]);
+        let mut before = self.route.curves.iter();
+        let before = before.nth_back(1).map_or(self.route.start, |c| c[2]);
         (end, direction(&[before, first, second], end))
     }
 

@@ -50,8 +50,9 @@ impl Picture<'_> {
         for (arrow, path, shown, fork) in &drawn {
             let ends = [arrow.from, arrow.to].map(|id| measured::find(&seen.items, id.at()));
             let mut parts = pen.arrow_parts(arrow, path, shown, ends);
-            if let Some(spot) = spotlight.filter(|spot| !spot.has_line(arrow, shown)) {
-                parts.iter_mut().for_each(|part| spot.pale(part));
+            let spot = spotlight.filter(|spot| !spot.has_line(arrow, shown));
+            for part in &mut parts {
+                spot.inspect(|spot| spot.pale(part));
             }
             let named = fork.and_then(|fork| last.get(&fork)).map(|at| drawn[*at].1);
             if named.is_some_and(|other| {

@@ -40,15 +40,6 @@ impl Choice {
         }
     }
 
-    /// The number of panels side by side, as far as it is known before anything is drawn; two if it is not.
-    pub(crate) fn columns(&self) -> usize {
-        match self {
-            Self::Grid(columns, _) => *columns,
-            Self::Windows(windows) => windows.len().min(2),
-            Self::Changes => 2,
-        }
-    }
-
     /// The chosen windows as indices in `view`, in order; at least one if there is any.
     ///
     /// # Errors

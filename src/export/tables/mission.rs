@@ -66,10 +66,8 @@ pub(super) const TABLES: &[Table] = &[
 ];
 
 fn put<R>(mission: &Mission, columns: &[Column<R>], one: &R, row: RowTaker<'_>) {
-    let cells: Vec<_> = columns
-        .iter()
-        .map(|column| (column.cell)(mission, one))
-        .collect();
+    let cells = columns.iter();
+    let cells: Vec<_> = cells.map(|column| (column.cell)(mission, one)).collect();
     row(&cells);
 }
 

@@ -219,10 +219,8 @@ impl Cut {
             outline: Outline::Box,
             cluster: None,
         };
-        let free = self
-            .free
-            .iter()
-            .map(|v| plan.vertices[part.vertices[*v]].clone());
+        let free = self.free.iter();
+        let free = free.map(|v| plan.vertices[part.vertices[*v]].clone());
         let of = |v: usize| {
             let block = self.spaces.binary_search(&self.space[v]);
             let free = |_| self.spaces.len() + self.free.partition_point(|other| *other < v);
