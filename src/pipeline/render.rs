@@ -321,7 +321,9 @@ impl<'a> Showing<'a> {
             self.drawing.page.timeline = Timeline::named(&source, rows);
         }
         let is_chosen = self.drawing.is_sized || self.drawing.page.width_mm.is_some();
-        if job.sequence.strip.is_some() && !is_chosen {
+        let is_single = |strip: &&Choice| matches!(strip, Choice::Windows(k) if k.len() == 1);
+        let strip = job.sequence.strip.as_ref().filter(|s| !is_single(s));
+        if strip.is_some() && !is_chosen {
             // Two such panels side by side fit a screen.
             self.drawing = self.drawing.clone().seen(Purpose::Readme);
         }
