@@ -466,11 +466,9 @@ impl Attempt {
         let readable = drawing.readable();
         let plan = measured.plan();
         let least = readable / measured.smallest_text();
-        let is_paper = drawing.medium.as_ref().is_some_and(|m| m.paper.is_some());
-        let almost = if is_paper { ALMOST.1 } else { ALMOST.0 };
         let page = LayoutOptions {
             least: if drawing.is_fitted {
-                almost * least
+                ALMOST * least
             } else {
                 0.0
             },
@@ -482,7 +480,7 @@ impl Attempt {
             (measured.text_px(&layout), layout)
         };
         let (mut text, mut layout) = placed(&page);
-        if drawing.is_fitted && (almost * readable..readable).contains(&text) {
+        if drawing.is_fitted && (ALMOST * readable..readable).contains(&text) {
             let tight = placed(&LayoutOptions {
                 is_tight: true,
                 least,
@@ -506,8 +504,8 @@ impl Attempt {
 }
 
 /// The share of the smallest legible text above which a drawing that fills the page better is tried: its text is at
-/// most an eighth larger. On paper, which is narrow and high, it may be half as large again.
-const ALMOST: (f64, f64) = (0.85, 0.7);
+/// most an eighth larger.
+const ALMOST: f64 = 0.85;
 
 /// The minimum area of a box in squares of its text height: it is at least as high as its text and four times as wide.
 const LEAST_BOX: f64 = 4.0;
