@@ -279,10 +279,8 @@ impl Arrow {
 
     /// The names of the topics that a bundle carries in a window.
     pub(crate) fn topics_in(&self, shown: &Shown) -> Vec<&str> {
-        let names = shown
-            .topics
-            .iter()
-            .map(|row| self.topics.get(row.topic as usize));
+        let names = shown.topics.iter();
+        let names = names.map(|row| self.topics.get(row.topic as usize));
         names.flatten().map(|name| &**name).collect()
     }
 }

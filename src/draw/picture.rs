@@ -380,7 +380,7 @@ impl<'a> Picture<'a> {
             let is_news = words.as_ref().is_some_and(also::is_news);
             titles.extend(if is_news { words } else { words.map(pale) });
         }
-        let [lines, labels] = self.lines(seen, spotlight.as_ref());
+        let [line_glows, lines, labels] = self.lines(seen, spotlight.as_ref());
         let items = seen.items.iter().filter_map(|shown| {
             let at = shown.id as usize;
             Some((view.items.get(shown.item())?, self.cards.get(at)?, shown))
@@ -389,7 +389,13 @@ impl<'a> Picture<'a> {
             .clone()
             .filter_map(|(item, card, shown)| pen.glow(item, card, shown));
         // Lines do not cross words.
-        groups.extend(glows.chain(lines).chain(titles).chain(labels));
+        groups.extend(
+            glows
+                .chain(line_glows)
+                .chain(lines)
+                .chain(titles)
+                .chain(labels),
+        );
         for (item, card, shown) in items {
             let mut drawn = pen.item(item, card, shown);
             if let Some(presence) = view.presences.get(shown.item()) {
@@ -462,11 +468,8 @@ fn tracks(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ArrowP
     let view = measured.view;
     let name = |id: ItemId| view.items.get(id).map_or("", |item| &*item.name);
     let empty = layout::Route::default();
-    let arrows = view
-        .arrows
-        .iter()
-        .zip(&measured.graph.plan.links)
-        .enumerate();
+    let arrows = view.arrows.iter();
+    let arrows = arrows.zip(&measured.graph.plan.links).enumerate();
     arrows
         .map(|(at, (arrow, link))| {
             let ends = [arrow.from, arrow.to].map(|id| name(id).to_owned());

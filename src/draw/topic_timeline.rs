@@ -20,6 +20,7 @@ use crate::draw::timeline::rows::{Row, of_topics};
 use crate::draw::timeline::source::FigureSource;
 
 use crate::graph::{Element, ElementState, NodeId};
+use crate::mission::event_log::Kind;
 use crate::view::{Frame, View};
 
 /// The least and the largest number of pixels per millimetre of the drawing, so that small text has at least
@@ -177,7 +178,7 @@ impl<'a> TopicTimeline<'a> {
         canvas.begin("nodes");
         let alive = graph.iter().flat_map(|g| g.nodes().map(|(id, _)| id));
         let alive: BTreeSet<NodeId> = alive.collect();
-        self.nodes(&mut canvas, &|id| !is_window || alive.contains(id));
+        self.nodes(&mut canvas, frame, &|id| !is_window || alive.contains(id));
         canvas.begin("why");
         let wide = self.options.size.w / self.scale - 2.0 * self.drawer.left;
         let why = self.why();
@@ -220,24 +221,43 @@ impl<'a> TopicTimeline<'a> {
         }
     }
 
-    /// Writes as many of the known nodes as fit; those that are in the window, if it is one.
-    fn nodes(&self, canvas: &mut PaperCanvas<'_>, is_there: &dyn Fn(&NodeId) -> bool) {
+    /// Writes as many of the known nodes as fit: those that start, stop or restart in this window in colour, then those that
+    /// are there.
+    fn nodes(
+        &self,
+        canvas: &mut PaperCanvas<'_>,
+        frame: &Frame,
+        is_there: &dyn Fn(&NodeId) -> bool,
+    ) {
         let elements = &self.source.mission.elements;
         let is_known = |id: &NodeId| !elements.seen(Element::Node(*id)).evidence.is_guess();
-        let is_shown = |id: &NodeId| is_known(id) && is_there(id);
-        let roles = self.source.roles.iter();
-        let roles = roles.filter(|(_, nodes)| nodes.iter().any(is_shown));
-        let names: Vec<String> = roles.map(|(role, _)| role.to_string()).collect();
-        let (left, title) = (self.drawer.left, "nodes known");
-        let after = left + canvas.width(title, Type::Small) + 1.2;
-        let x = self.drawer.axis.left.max(after);
-        let room = self.options.size.w / self.scale - left - x;
-        let fits = |text: &str| canvas.width(text, Type::Small) <= room;
-        let text = fitting(&names, names.len(), fits);
-        if !names.is_empty() {
-            let y = self.drawer.end() + Sizes::SCREEN.line() + 2.0 + LABEL / 2.0;
-            canvas.text(left, y, Type::Small, ink::QUIET, title);
-            canvas.text(x, y, Type::Small, ink::TEXT, &text);
+        let color = |id: &NodeId| {
+            let mut news = frame.headlines.iter().rev();
+            let news = news.find_map(|h| match h.kind {
+                _ if h.what != Element::Node(*id) => None,
+                Kind::Started => Some(ink::ADDED),
+                Kind::Stopped => Some(ink::REMOVED),
+                Kind::Restarted => Some(ink::CHANGED),
+                _ => None,
+            });
+            news.or_else(|| (is_known(id) && is_there(id)).then_some(ink::TEXT))
+        };
+        let (left, mut title) = (self.drawer.left, Some("nodes known"));
+        let after = left + title.map_or(0.0, |title| canvas.width(title, Type::Small)) + 1.2;
+        let mut x = self.drawer.axis.left.max(after);
+        let end = self.options.size.w / self.scale - left;
+        let y = self.drawer.end() + Sizes::SCREEN.line() + 2.0 + LABEL / 2.0;
+        for own in [ink::ADDED, ink::REMOVED, ink::CHANGED, ink::TEXT] {
+            let roles = self.source.roles.iter();
+            let roles = roles.filter(|(_, nodes)| nodes.iter().find_map(color) == Some(own));
+            let names: Vec<String> = roles.map(|(role, _)| role.to_string()).collect();
+            if !names.is_empty() {
+                let fits = |text: &str| canvas.width(text, Type::Small) <= end - x;
+                let text = fitting(&names, names.len(), fits);
+                canvas.text(left, y, Type::Small, ink::QUIET, title.take().unwrap_or(""));
+                canvas.text(x, y, Type::Small, own, &text);
+                x += canvas.width(&text, Type::Small) + 1.2;
+            }
         }
     }
 }

@@ -249,10 +249,8 @@ fn topics(mission: &Mission, view: &View, info: &Info) -> String {
     let all = mission.elements.topics.with_ids();
     let all = all.filter(|(id, _)| shown.contains(&Element::Topic(*id)));
     let rows = all.map(|(id, topic)| {
-        let own = info
-            .topics
-            .iter()
-            .find(|own| own.name == topic.name.as_str());
+        let mut own = info.topics.iter();
+        let own = own.find(|own| own.name == topic.name.as_str());
         let types: Vec<String> = topic.types.iter().map(|t| code(t)).collect();
         row(&[
             code(topic.name.as_str()),

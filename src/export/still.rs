@@ -13,9 +13,6 @@ use crate::export::sequence::{FrameTime, Sequence, Shows};
 use crate::export::sink::write_file;
 use crate::export::target::Target;
 
-/// Pixels of an image per pixel of a page on paper: 300 instead of 96 to the inch.
-const PAPER: f64 = 300.0 / 96.0;
-
 /// The formats of still drawings.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StillKind {
@@ -60,8 +57,7 @@ impl Images<'_> {
         if self.kind == StillKind::Svg {
             return Ok(svg::write(scene).into_bytes());
         }
-        let paper = if scene.width_mm.is_some() { PAPER } else { 1.0 };
-        let scale = self.sequence.options.scale * paper;
+        let scale = self.sequence.options.scale;
         encoded(self.kind, &self.sequence.painter.paint(scene, scale)?)
     }
 }

@@ -77,16 +77,10 @@ pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
 
 /// The share of the labels that could be placed, from 0 to 1.
 fn labelled(plan: &Plan, layout: &Layout) -> f64 {
-    let wanted = plan
-        .links
-        .iter()
-        .filter(|link| link.label.is_some())
-        .count();
-    let placed = layout
-        .routes
-        .iter()
-        .filter(|route| route.label.is_some())
-        .count();
+    let wanted = plan.links.iter();
+    let wanted = wanted.filter(|link| link.label.is_some()).count();
+    let placed = layout.routes.iter();
+    let placed = placed.filter(|route| route.label.is_some()).count();
     if wanted == 0 {
         1.0
     } else {

@@ -37,11 +37,8 @@ pub(crate) fn kept(plan: &Plan, known: &[Option<Rect>], orientation: Orientation
         }
     }
     let clusters = table.frames();
-    let boxes: Vec<Rect> = table
-        .boxes
-        .into_iter()
-        .map(Option::unwrap_or_default)
-        .collect();
+    let boxes = table.boxes.into_iter();
+    let boxes: Vec<Rect> = boxes.map(Option::unwrap_or_default).collect();
     let whole = boxes
         .iter()
         .chain(&clusters)

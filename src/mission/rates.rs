@@ -181,9 +181,14 @@ const STEP: f64 = 0.05;
 /// The rates of some pieces in order, those that are nearly equal as one; none if there is only one.
 pub(crate) fn steps(pieces: &[Piece]) -> Vec<f64> {
     let mut steps: Vec<f64> = pieces.iter().map(|piece| piece.hz).collect();
-    steps.dedup_by(|a, b| (*a - *b).abs() <= STEP * a.max(*b));
+    steps.dedup_by(|a, b| are_close(*a, *b));
     steps.truncate(if steps.len() > 1 { steps.len() } else { 0 });
     steps
+}
+
+/// Whether two rates look the same.
+pub(crate) fn are_close(a: f64, b: f64) -> bool {
+    (a - b).abs() <= STEP * a.max(b)
 }
 
 /// The mean rate over some pieces; `None` if they have no length.

@@ -130,12 +130,8 @@ fn of_graph(
             },
         ));
     }
-    let folded: Vec<&str> = composed
-        .options
-        .collapse
-        .iter()
-        .map(|name| &**name)
-        .collect();
+    let folded = composed.options.collapse.iter();
+    let folded: Vec<&str> = folded.map(|name| &**name).collect();
     let remark = || {
         let names = words::some_of(&folded, MOST_NAMED);
         format!("not all nodes fit, so that each of these namespaces is one box: {names}")

@@ -256,10 +256,8 @@ impl Fitting<'_> {
         let elements = &self.mission.elements;
         let view = &self.best.composed.view;
         let mut reported: BTreeSet<Element> = headlines(self.mission).collect();
-        let topics: BTreeSet<_> = reported
-            .iter()
-            .filter_map(|what| elements.ends(*what).1)
-            .collect();
+        let topics = reported.iter();
+        let topics: BTreeSet<_> = topics.filter_map(|what| elements.ends(*what).1).collect();
         let edges = elements
             .edges()
             .filter(|(_, edge)| topics.contains(&edge.topic));
@@ -270,10 +268,8 @@ impl Fitting<'_> {
                 .iter()
                 .any(|m| reported.contains(m))
         };
-        let lines = view
-            .arrows
-            .iter()
-            .filter(|a| is_reported(a.from) != is_reported(a.to));
+        let lines = view.arrows.iter();
+        let lines = lines.filter(|a| is_reported(a.from) != is_reported(a.to));
         let partners: BTreeSet<ItemId> = lines.flat_map(|arrow| [arrow.from, arrow.to]).collect();
         let members = partners.iter().flat_map(|item| &view.items[*item].members);
         let members: Vec<Element> = members.copied().collect();

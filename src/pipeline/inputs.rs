@@ -99,14 +99,10 @@ pub(super) fn affordable(reading: &Reading) -> CollectOptions {
 
 /// Refuses an offset or a namespace that applies to none of the inputs.
 pub(super) fn check_named(reading: &Reading, inputs: &[Input]) -> Result<()> {
-    let offsets = reading
-        .offsets
-        .iter()
-        .map(|(name, _)| (name, "offset", "+0.35s"));
-    let spaces = reading
-        .namespaces
-        .iter()
-        .map(|(name, _)| (name, "ns", "/robot2"));
+    let offsets = reading.offsets.iter();
+    let offsets = offsets.map(|(name, _)| (name, "offset", "+0.35s"));
+    let spaces = reading.namespaces.iter();
+    let spaces = spaces.map(|(name, _)| (name, "ns", "/robot2"));
     let is_used = |name: &Path| inputs.iter().any(|input| is_of(name, input));
     match offsets.chain(spaces).find(|(name, ..)| !is_used(name)) {
         None => Ok(()),

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::compose::Composed;
 use super::fit::{LARGEST, fitted};
 use super::unfolded::Opened;
-use super::{Body, Drawing, Reading, Stage, Watch, figure, read};
+use super::{Body, Drawing, Purpose, Reading, Stage, Watch, figure, read};
 use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
@@ -29,6 +29,9 @@ use crate::layout::LayoutOptions;
 use crate::mission::Mission;
 use crate::mission::phases::knows_publishers;
 use crate::view::{Grouping, Mode, View, check_filters, filtered, nothing, unmatched};
+
+/// Pixels of an image per pixel of a page on paper: 300 instead of 96 to the inch.
+const PAPER: f64 = 300.0 / 96.0;
 
 /// The whole job of `bagreel render`.
 #[derive(Clone)]
@@ -279,6 +282,10 @@ impl<'a> Showing<'a> {
 
     /// The sequence without a picture.
     fn sequence<'s>(&'s self, view: &'s View) -> Sequence<'s> {
+        let mut options = self.job.sequence.clone();
+        if self.drawing.page.width_mm.is_some() || self.kind == PictureKind::Figure {
+            options.scale *= PAPER;
+        }
         Sequence {
             mission: self.mission,
             data: self.data.as_ref().unwrap_or(self.mission),
@@ -292,7 +299,7 @@ impl<'a> Showing<'a> {
             fonts: &self.drawing.fonts,
             strip: None,
             latex: None,
-            options: self.job.sequence.clone(),
+            options,
         }
     }
 
@@ -312,6 +319,13 @@ impl<'a> Showing<'a> {
             let most = most_rows(self.drawing.page.size.h);
             let rows = together(&source, rows.clone(), most, false);
             self.drawing.page.timeline = Timeline::named(&source, rows);
+        }
+        let is_chosen = self.drawing.is_sized || self.drawing.page.width_mm.is_some();
+        let is_single = |strip: &&Choice| matches!(strip, Choice::Windows(k) if k.len() == 1);
+        let strip = job.sequence.strip.as_ref().filter(|s| !is_single(s));
+        if strip.is_some() && !is_chosen {
+            // Two such panels side by side fit a screen.
+            self.drawing = self.drawing.clone().seen(Purpose::Readme);
         }
         let composed = if is_drawn {
             fitted(mission, &self.drawing, watch)

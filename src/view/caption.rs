@@ -127,10 +127,8 @@ impl<'a> CaptionWriter<'a> {
             self.ongoing(ongoing).add(&mut groups, ongoing.event);
         }
         let (log, span) = (self.log, frame.span);
-        let during = log
-            .interruptions
-            .iter()
-            .filter(|one| span.contains(one.time));
+        let during = log.interruptions.iter();
+        let during = during.filter(|one| span.contains(one.time));
         let during = during.map(|one| Phrase {
             sign: ' ',
             names: vec![interrupted(one)],
@@ -367,10 +365,8 @@ impl<'a> CaptionWriter<'a> {
     }
 
     fn people(&self, nodes: &[NodeId]) -> String {
-        let names: Vec<String> = nodes
-            .iter()
-            .map(|id| self.name(Element::Node(*id)))
-            .collect();
+        let names = nodes.iter();
+        let names: Vec<String> = names.map(|id| self.name(Element::Node(*id))).collect();
         words::some_of(&names, 2)
     }
 }

@@ -63,10 +63,8 @@ impl Keep {
     fn log(&mut self, all: &EventLog) -> EventLog {
         let stays = |event: &Event| self.element(event.what).is_some();
         let mut next = (0..).map(EventId::of);
-        let new = all
-            .events
-            .iter()
-            .map(|event| stays(event).then(|| next.next()).flatten());
+        let new = all.events.iter();
+        let new = new.map(|event| stays(event).then(|| next.next()).flatten());
         self.events = new.collect();
         let events = all.events.iter().filter_map(|event| {
             Some(Event {

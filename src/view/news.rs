@@ -39,10 +39,8 @@ impl View {
         let home = home(&names);
         let items = self.items.iter();
         let alone = |looks: &ShownRuns| ShownRuns::of([self.seen_at(looks, k).as_ref()]);
-        let there = self
-            .items_shown
-            .iter()
-            .filter(|looks| looks.at(k).is_some());
+        let there = self.items_shown.iter();
+        let there = there.filter(|looks| looks.at(k).is_some());
         let left_out = there.count() - names.len();
         let mut view = Self {
             items: items.map(|item| relative(item, home.as_deref())).collect(),

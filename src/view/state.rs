@@ -28,6 +28,9 @@ fn gather(slot: &mut Option<Shown>, id: u32, one: Shown) {
     }
 }
 
+/// The largest ratio of the rates of equal topics in a window: half of it may be counted in the window before.
+const EQUAL: f64 = 1.5;
+
 /// The items and arrows with an existing element at a point in time.
 #[derive(Default)]
 pub(crate) struct LivingItems {
@@ -225,10 +228,13 @@ impl<'a> Now<'a> {
         }
         let has_nodes = item.members.first().is_some_and(Element::is_node);
         let mut slot = None;
+        let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
         for member in &item.members {
             let Some(mut one) = self.one(*member) else {
                 continue;
             };
+            let sent = one.hz.filter(|hz| *hz > 0.0);
+            (least, most) = sent.map_or((least, most), |hz| (least.min(hz), most.max(hz)));
             if member.is_topic() && has_nodes {
                 // The nodes inside a collapsed namespace already count what they publish.
                 one.hz = None;
@@ -251,7 +257,8 @@ impl<'a> Now<'a> {
             let row = self.rows.of(*node).and_then(Option::as_ref);
             shown.lifecycle = row.and_then(|row| self.mission.graphs.lifecycle(row).cloned());
         }
-        if !item.is_replica {
+        // Of unequal rates, the sum is true.
+        if !item.is_replica || most > EQUAL * least {
             shown.each = 0;
         }
         if item.kind == ItemKind::Namespace {

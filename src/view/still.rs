@@ -15,9 +15,9 @@ use crate::base::ids::grouped;
 use crate::base::time::Span;
 use crate::base::words;
 use crate::graph::history::Sender;
-use crate::graph::{ById, Element};
+use crate::graph::{ById, Element, State};
 use crate::mission::event_log::{Event, Kind};
-use crate::mission::rates::{Rates, same, steps};
+use crate::mission::rates::{Rates, are_close, same, steps};
 use crate::mission::{EventId, Mission};
 
 /// The times at which a box of a still was there.
@@ -116,14 +116,36 @@ impl StillRates<'_> {
         }
     }
 
-    /// The look of a box or row of a single topic, with its rates.
+    /// The look of a box or row of topics, with the rates of a single one, or of each of several with equal ones.
     fn of_topics(&self, members: &[Element], shown: Shown) -> Shown {
-        let [Element::Topic(topic)] = members else {
+        let rates = |what: &Element| match what {
+            Element::Topic(topic) if members.len() == 1 || shown.each > 0 => {
+                let hz = shown.hz.filter(|_| members.len() == 1);
+                Some(self.rate(&self.0.of_topic(*topic), hz))
+            }
+            _ => None,
+        };
+        let rates: Option<Vec<_>> = members.iter().map(rates).collect();
+        let Some((first, others)) = rates.as_deref().and_then(<[_]>::split_first) else {
             return shown;
         };
-        let senders: Vec<&Sender> = self.0.of_topic(*topic);
-        let (hz, steps) = self.rate(&senders, shown.hz);
-        Shown { hz, steps, ..shown }
+        let all = |(hz, steps): &(Option<f64>, Vec<f64>)| -> Vec<f64> {
+            hz.iter().chain(steps).copied().collect()
+        };
+        let (own, many) = (all(first), members.len());
+        let are_equal = |other: Vec<f64>| {
+            other.len() == own.len() && own.iter().zip(other).all(|(a, b)| are_close(*a, b))
+        };
+        if !others.iter().map(all).all(are_equal) {
+            let (hz, each) = (None, 0);
+            return Shown { hz, each, ..shown };
+        }
+        Shown {
+            hz: first.0.map(|hz| hz * many as f64),
+            each: if many > 1 { many } else { 0 },
+            steps: first.1.clone(),
+            ..shown
+        }
     }
 
     /// The look of a line, with the rates of each topic on it.
@@ -156,9 +178,12 @@ fn whole(looks: &ShownRuns, lengths: &Lengths) -> Option<Shown> {
     let time = first.map_or(0.0, |first| lengths.of(first, last));
     let average = |sum: f64| if time > 0.0 { sum / time } else { 0.0 };
     let sum: Shown = slot?;
-    let hz = sum.hz.map(average);
+    let hz = sum.hz.map(average).filter(|_| sum.state != State::Latched);
+    // One message that is latched has no rate.
+    let counted = |state, count: Option<u64>| count.filter(|_| state != State::Latched);
     let row = |row: TopicRow| TopicRow {
-        hz: row.hz.map(average),
+        hz: row.hz.map(average).filter(|_| row.state != State::Latched),
+        count: counted(row.state, row.count),
         ..row
     };
     let topics = sum.topics.iter().cloned().map(row).collect();
@@ -166,6 +191,7 @@ fn whole(looks: &ShownRuns, lengths: &Lengths) -> Option<Shown> {
         topics,
         hz,
         steady_hz: hz,
+        count: counted(sum.state, sum.count),
         ..sum
     })
 }
@@ -203,6 +229,7 @@ fn gather(slot: &mut Option<Shown>, shown: &Shown, length: f64, windows: u64) {
             Ok(place) => add_row(&mut sum.topics[place], &row),
         }
     }
+    let states = [sum.state, shown.state];
     sum.add(&Shown {
         hz: shown.hz.map(|hz| hz * length),
         count,
@@ -210,14 +237,22 @@ fn gather(slot: &mut Option<Shown>, shown: &Shown, length: f64, windows: u64) {
         is_starved: shown.is_starved,
         ..Shown::plain(0, shown.state, shown.confidence)
     });
+    sum.state = in_both(states, sum.count);
 }
 
 fn add_row(sum: &mut TopicRow, row: &TopicRow) {
     sum.ways = [sum.ways[0] | row.ways[0], sum.ways[1] | row.ways[1]];
-    sum.state = sum.state.min(row.state);
     sum.is_starved &= row.is_starved;
     sum.hz = added(sum.hz, row.hz, |a, b| a + b);
     sum.count = added(sum.count, row.count, u64::saturating_add);
+    sum.state = in_both([sum.state, row.state], sum.count);
+}
+
+/// The most active of two states; a single message that is latched stays so.
+fn in_both(states: [State; 2], count: Option<u64>) -> State {
+    let is_latched = states.contains(&State::Latched) && count <= Some(1);
+    let single = is_latched.then_some(State::Latched);
+    single.unwrap_or(states[0].min(states[1]))
 }
 
 /// Marks of nodes, each with its event, as parts of the mission's time.
@@ -262,11 +297,8 @@ fn presence(item: &Item, mission: &Mission, marks: &NodeMarks) -> Presence {
 /// The number of nodes in boxes and in words; the runs of an anonymous node are one.
 fn roles(view: &View, mission: &Mission) -> usize {
     let in_words = view.also.iter().flat_map(|also| &also.items);
-    let members = view
-        .items
-        .iter()
-        .chain(in_words)
-        .flat_map(|item| &item.members);
+    let members = view.items.iter();
+    let members = members.chain(in_words).flat_map(|item| &item.members);
     let role = |what: &Element| match what {
         Element::Node(id) => mission.elements.nodes.get(*id).map(|node| &*node.role),
         _ => None,
@@ -306,6 +338,32 @@ mod tests {
     use super::*;
     use crate::view::testing::mission;
     use crate::view::{ViewOptions, view};
+
+    #[test]
+    fn a_still_says_the_rate_of_each_of_equal_topics_only_if_they_are_equal() {
+        let robots = |hz: [u8; 4]| {
+            let robot = |(n, hz)| format!("/r{n}/drive>/r{n}/odom@{hz} /r{n}/plan</r{n}/odom");
+            (1..).zip(hz).map(robot).collect::<Vec<_>>().join(" ")
+        };
+        let said = |windows: &[[u8; 4]]| {
+            let windows: Vec<String> = windows.iter().map(|hz| robots(*hz)).collect();
+            let windows: Vec<&str> = windows.iter().map(String::as_str).collect();
+            let options = ViewOptions {
+                is_still: Some(true),
+                ..ViewOptions::default()
+            };
+            let (seen, _) = view(&mission(&windows), &options);
+            let mut items = seen.items.with_ids();
+            let (odom, _) = items.find(|(_, i)| &*i.name == "/rN/odom").unwrap();
+            let shown = seen.items_shown[odom].at(0).unwrap();
+            (shown.each, shown.hz, shown.steps.clone())
+        };
+        assert_eq!(said(&[[2; 4], [2; 4]]), (4, Some(8.0), vec![]));
+        let (each, _, steps) = said(&[[100; 4], [100; 4], [200; 4]]);
+        assert_eq!((each, steps), (4, vec![100.0, 200.0]));
+        // Of unequal rates, the sum is true.
+        assert_eq!(said(&[[10, 20, 10, 20]; 2]), (0, Some(60.0), vec![]));
+    }
 
     #[test]
     fn rates_are_averaged_from_the_first_message_to_the_last() {

@@ -60,10 +60,8 @@ pub(crate) fn write(
             used.push((name('F', place), ids[0]));
         }
     }
-    let pages: Vec<Ref> = drawn
-        .iter()
-        .map(|page| file.page(page, tree, &used))
-        .collect();
+    let pages = drawn.iter();
+    let pages: Vec<Ref> = pages.map(|page| file.page(page, tree, &used)).collect();
     let count = i32::try_from(pages.len()).unwrap_or(i32::MAX);
     file.pdf
         .pages(tree)

@@ -173,12 +173,8 @@ impl ArrowPath {
         let Some([first, second, end]) = self.route.curves.last().copied() else {
             return (self.route.start, direction(&[], self.route.start));
         };
-        let before = self
-            .route
-            .curves
-            .iter()
-            .nth_back(1)
-            .map_or(self.route.start, |c| c[2]);
+        let mut before = self.route.curves.iter();
+        let before = before.nth_back(1).map_or(self.route.start, |c| c[2]);
         (end, direction(&[before, first, second], end))
     }
 
@@ -189,14 +185,14 @@ impl ArrowPath {
 }
 
 impl GraphPen<'_> {
-    /// The line of an arrow in one window, and its rate and badge, which lines must not cover.
+    /// Its glow, which belongs below all lines, its line, and its rate and badge, which lines must not cover.
     pub(crate) fn arrow_parts(
         &self,
         arrow: &Arrow,
         track: &ArrowPath,
         shown: &Shown,
         ends: [Option<&Shown>; 2],
-    ) -> (Group, Group) {
+    ) -> [Group; 3] {
         let look = options::of_arrow(self.style, &arrow.kind, shown, shown.steady_hz);
         let [from, to] = &track.ends;
         let kind = arrow.kind.word();
@@ -214,16 +210,18 @@ impl GraphPen<'_> {
             id: format!("{}..over", group.id),
             ..group.clone()
         };
+        let glow = Group::new(format!("{}..glow", group.id), "glow");
+        let mut glow = glow.with(vec![("of", group.id.clone())]);
         let tip = match arrow.kind {
             _ if shown.is_starved => Tip::Stop,
             ArrowKind::Bundle | ArrowKind::Direct(_) if arrow.is_service => Tip::Service,
             _ => Tip::Arrow,
         };
         if arrow.kind == ArrowKind::Bundle {
-            self.line(&mut group, track, &look, tip, shown.ways());
+            self.line([&mut glow, &mut group], track, &look, tip, shown.ways());
             self.rows(&mut over, track, shown, &look);
         } else {
-            self.line(&mut group, track, &look, tip, [true, false]);
+            self.line([&mut glow, &mut group], track, &look, tip, [true, false]);
         }
         // A rate that changed is shown even where there is no space beside the line, unless its topic shows it.
         let is_at_end = ends.into_iter().flatten().any(Shown::has_new_rate);
@@ -236,7 +234,7 @@ impl GraphPen<'_> {
             let size = self.fit.pen * 0.8;
             badge::badge(&mut over, self.style, mark, track.badge, size);
         }
-        (group, over)
+        [glow, group, over]
     }
 
     /// The bar at the end of a line of ordinary width through which nothing arrives.
@@ -246,10 +244,10 @@ impl GraphPen<'_> {
         Tip::Stop.form(tip, along, (edge.arrow + edge.width) * self.fit.pen)
     }
 
-    /// The line with a head at its end and at its start, according to `heads`.
+    /// The line, and its glow, with a head at its end and at its start, according to `heads`.
     fn line(
         &self,
-        group: &mut Group,
+        [glow, group]: [&mut Group; 2],
         track: &ArrowPath,
         look: &ArrowLook,
         kind: Tip,
@@ -287,7 +285,7 @@ impl GraphPen<'_> {
         let path = Form::Path(steps);
         if look.glow != Color::NONE {
             let width = stroke.width + 1.2 * self.style.badge.glow * scale;
-            group.shape(Shape::line(path.clone(), Stroke::solid(look.glow, width)));
+            glow.shape(Shape::line(path.clone(), Stroke::solid(look.glow, width)));
         }
         group.shape(Shape::line(path, stroke));
         let tips = [(end, along), (track.route.start, against)];

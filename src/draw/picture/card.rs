@@ -149,10 +149,8 @@ impl Line {
     fn width(&self, view: &View, style: &Style, fonts: &Fonts) -> f64 {
         let size = style.topic.size;
         let words = fonts.width(&self.words(|_| true), size, Weight::SemiBold);
-        let looks = self
-            .topics
-            .iter()
-            .flat_map(|(at, _)| view.rows[*at].shown.distinct());
+        let looks = self.topics.iter();
+        let looks = looks.flat_map(|(at, _)| view.rows[*at].shown.distinct());
         let rates = looks.filter(|_| self.topics.len() == 1).filter_map(rate);
         let rates = rates.map(|text| fonts.width(&text, style.topic.small, Weight::SemiBold));
         words + rates.fold(0.0, f64::max) + 3.0 * PAD * size

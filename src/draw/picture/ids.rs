@@ -11,10 +11,8 @@ use crate::view::{Arrow, ArrowKind, Item, ItemKind, Mark, Shown, View};
 
 /// The notice about names with characters that no font contains; `None` if there are none.
 pub fn unshown(view: &View, fonts: &Fonts) -> Option<Notice> {
-    let items = view
-        .items
-        .iter()
-        .chain(view.rows.iter().map(|row| &row.item));
+    let items = view.items.iter();
+    let items = items.chain(view.rows.iter().map(|row| &row.item));
     let names = items.map(|item| &*item.name);
     let missing: BTreeSet<char> = names.flat_map(|name| fonts.missing(name)).collect();
     let spelled = missing.iter().map(|c| c.escape_unicode().to_string());
@@ -63,12 +61,8 @@ pub(crate) fn data(item: &Item, shown: &Shown) -> Vec<(&'static str, String)> {
         ("state", shown.state.word().to_owned()),
     ];
     data.extend(shown.mark.map(|mark| ("mark", mark.word().to_owned())));
-    let counted: Vec<&str> = item
-        .counted
-        .iter()
-        .chain(&shown.unlined)
-        .map(|name| &**name)
-        .collect();
+    let counted = item.counted.iter();
+    let counted: Vec<&str> = counted.chain(&shown.unlined).map(|name| &**name).collect();
     if !counted.is_empty() {
         data.push(("topics", counted.join(" ")));
     }

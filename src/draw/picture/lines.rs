@@ -10,12 +10,13 @@ use crate::graph::Id as _;
 use crate::view::{ArrowId, SeenWindow};
 
 impl Picture<'_> {
-    /// The lines of a window, and their labels; changed ones last, so that they are on top.
+    /// The glows of the lines of a window, which cover no head of another, the lines, and their labels; changed ones last, so
+    /// that they are on top.
     pub(super) fn lines(
         &self,
         seen: &SeenWindow,
         spotlight: Option<&Spotlight<'_>>,
-    ) -> [Vec<Group>; 2] {
+    ) -> [Vec<Group>; 3] {
         let measured = &self.measured;
         let links = &measured.graph.plan.links;
         let look = |id: ArrowId| measured::find(&seen.arrows, id.at());
@@ -45,25 +46,23 @@ impl Picture<'_> {
             last.extend(fork.map(|fork| (fork, k)));
         }
         let pen = self.pen();
-        let mut groups = [Vec::new(), Vec::new()];
+        let mut groups = [(); 3].map(|()| Vec::new());
         for (arrow, path, shown, fork) in &drawn {
             let ends = [arrow.from, arrow.to].map(|id| measured::find(&seen.items, id.at()));
-            let (mut line, mut label) = pen.arrow_parts(arrow, path, shown, ends);
-            if let Some(spot) = spotlight.filter(|spot| !spot.has_line(arrow, shown)) {
-                spot.pale(&mut line);
-                spot.pale(&mut label);
+            let mut parts = pen.arrow_parts(arrow, path, shown, ends);
+            let spot = spotlight.filter(|spot| !spot.has_line(arrow, shown));
+            for part in &mut parts {
+                spot.inspect(|spot| spot.pale(part));
             }
             let named = fork.and_then(|fork| last.get(&fork)).map(|at| drawn[*at].1);
             if named.is_some_and(|other| {
                 !std::ptr::eq(other, *path) && other.label_area() == path.label_area()
             }) {
-                label
-                    .pieces
-                    .retain(|piece| !matches!(piece, Piece::Text(_)));
+                let label = &mut parts[2].pieces;
+                label.retain(|piece| !matches!(piece, Piece::Text(_)));
             }
-            groups[0].push(line);
-            if !label.pieces.is_empty() {
-                groups[1].push(label);
+            for (group, part) in groups.iter_mut().zip(parts) {
+                group.extend(Some(part).filter(|part| !part.pieces.is_empty()));
             }
         }
         groups

@@ -286,13 +286,8 @@ impl Measurer<'_> {
         let style = &self.style.edge;
         let reported = shown_by_arrows(self.view);
         let nothing = ShownRuns::default();
-        let all = self
-            .view
-            .arrows
-            .iter()
-            .zip(&self.view.arrows_shown)
-            .zip(reported)
-            .zip(topics);
+        let all = self.view.arrows.iter();
+        let all = all.zip(&self.view.arrows_shown).zip(reported).zip(topics);
         let rooms = all.map(|(((arrow, looks), is_reported), names)| {
             let mut widest = None;
             if arrow.kind == ArrowKind::Bundle {

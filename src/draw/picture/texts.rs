@@ -70,6 +70,7 @@ pub(crate) fn inside(counts: &Counts) -> String {
 pub(crate) fn rate_in(shown: &Shown) -> Option<String> {
     let rate = match &shown.steps[..] {
         [_, _, ..] if shown.each < 2 => rates(&shown.steps),
+        [_, _, ..] => rates(&shown.steps) + " each",
         _ => plain_rate(shown)?,
     };
     Some(match &shown.sender {

@@ -168,7 +168,8 @@ impl Picture<'_> {
             .map(|((((arrow, looks), track), link), marks)| {
                 let shown = plain(link.label.map(|_| 1.0));
                 let is_starved = looks.distinct().iter().any(|look| look.is_starved);
-                let (mut group, over) = pen.arrow_parts(arrow, &track, &shown, [None; 2]);
+                let [glow, mut group, over] = pen.arrow_parts(arrow, &track, &shown, [None; 2]);
+                group.pieces.splice(..0, glow.pieces);
                 group.pieces.extend(over.pieces);
                 UnionElement {
                     group,

@@ -60,11 +60,8 @@ pub(crate) fn notes(timeline: &Timeline, is_beside: bool) -> Vec<Unbroken> {
 
 /// Every sign that is drawn, with its label.
 pub(crate) fn signs(timeline: &Timeline) -> Vec<Unbroken> {
-    let open: Vec<&Row> = timeline
-        .rows
-        .iter()
-        .filter(|r| r.folded.is_empty())
-        .collect();
+    let open = timeline.rows.iter();
+    let open: Vec<&Row> = open.filter(|r| r.folded.is_empty()).collect();
     let is_silent = |row: &&Row| {
         let busy: i64 = row.bars.iter().map(|b| b.span.nanos()).sum();
         let alive: i64 = row.lives.iter().map(Span::nanos).sum();

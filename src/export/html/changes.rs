@@ -175,10 +175,8 @@ impl PageChanges {
 
     /// A row per change: its time as a link, and its sentence; empty without changes.
     pub(super) fn table(&self, compares: bool) -> String {
-        let lines = self
-            .windows
-            .iter()
-            .flat_map(|w| w.3.iter().map(|line| (w.0, line)));
+        let lines = self.windows.iter();
+        let lines = lines.flat_map(|w| w.3.iter().map(|line| (w.0, line)));
         let mut lines: Vec<(usize, &ChangeLine)> = lines.collect();
         // Windows may overlap.
         lines.sort_by(|(_, a), (_, b)| a.0.total_cmp(&b.0).then(a.4.cmp(&b.4)));

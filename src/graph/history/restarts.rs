@@ -82,11 +82,8 @@ impl Own<'_> {
     fn beats(&self, death: Stamp, birth: Stamp) -> [bool; 2] {
         let away = birth.since(death);
         let is_near = |late: i64, s: &Stretch| (0..=broken_after(s.period)).contains(&late);
-        let all = self
-            .sender
-            .stretches
-            .iter()
-            .filter(|_| !self.sender.latched);
+        let all = self.sender.stretches.iter();
+        let all = all.filter(|_| !self.sender.latched);
         let mut even = all.filter(|s| s.is_even && s.count >= FEWEST && s.period * 2 <= away);
         let ends = even
             .clone()

@@ -74,10 +74,8 @@ impl Simulation {
 
     /// The times at which it stood still, sorted.
     pub(crate) fn pauses(&self) -> impl Iterator<Item = Span> + '_ {
-        let paused = self
-            .changes
-            .iter()
-            .filter(|(_, what)| *what == ClockChange::Paused);
+        let paused = self.changes.iter();
+        let paused = paused.filter(|(_, what)| *what == ClockChange::Paused);
         paused.map(|(span, _)| *span)
     }
 
@@ -238,10 +236,8 @@ fn speeds_of_rates(traffic: &Traffic) -> Vec<(Span, f64)> {
             let spans = s.first.plus(margin) <= at && at <= s.last.plus(-margin);
             spans && s.is_even && s.period <= GAP_NS
         };
-        let others = senders
-            .iter()
-            .filter(|s| s.stretches.iter().any(goes_on))
-            .count();
+        let others = senders.iter();
+        let others = others.filter(|s| s.stretches.iter().any(goes_on)).count();
         let is_most = alike * 100 >= (many + others) * SPEED_SHARE;
         // Slow topics show the same step somewhat later.
         let is_new = at.since(from) >= SPEED_HOLDS_NS;

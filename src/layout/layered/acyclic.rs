@@ -48,10 +48,8 @@ fn reaches(
 /// The edges to reverse when all edges between two clusters must run one way; pairs with more edges choose first.
 /// `home` is the innermost cluster of each item, `parent` the cluster around each, with 0 for the outside.
 pub(crate) fn by_cluster(edges: &[(usize, usize)], home: &[usize], parent: &[usize]) -> Vec<bool> {
-    let sides: Vec<(usize, usize)> = edges
-        .iter()
-        .map(|&ends| parting(ends, home, parent))
-        .collect();
+    let sides = edges.iter();
+    let sides: Vec<(usize, usize)> = sides.map(|&ends| parting(ends, home, parent)).collect();
     let mut pairs: BTreeMap<(usize, usize), (Reverse<usize>, usize)> = BTreeMap::new();
     for (i, &pair) in sides.iter().enumerate() {
         pairs.entry(pair).or_insert((Reverse(0), i)).0.0 += 1;

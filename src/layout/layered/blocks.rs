@@ -23,8 +23,8 @@ const SHAPES: [f64; 3] = [0.3, 1.0, 3.0];
 const PIECES: u32 = 3;
 
 /// The part with its outermost namespaces as blocks, in the way that is judged best, and its quality: with all contents
-/// on pages of one shape, and for a drawing that fills the page, each in its own. `None` if it has fewer than two
-/// namespaces, or something is too large.
+/// on pages of one shape, and for a drawing that fills the page, each in its own. `None` if it has no
+/// namespace or only one around everything, or something is too large.
 pub(crate) fn best(task: PartTask<'_>) -> Option<(f64, PlacedPart)> {
     let blocks = Blocks::new(task)?;
     let judged = |shapes: Vec<usize>| {
@@ -202,9 +202,11 @@ impl Cut {
             space[from] == 0 || space[from] != space[to]
         };
         let between = (0..part.ends.len()).filter(is_between).collect();
-        (spaces.len() > 1).then(|| Self {
+        let free: Vec<usize> = (0..space.len()).filter(|v| space[*v] == 0).collect();
+        let is_cut = spaces.len() > 1 || spaces.len() == 1 && !free.is_empty();
+        is_cut.then(|| Self {
             spaces: spaces.into_iter().collect(),
-            free: (0..space.len()).filter(|v| space[*v] == 0).collect(),
+            free,
             between,
             space,
         })
@@ -217,10 +219,8 @@ impl Cut {
             outline: Outline::Box,
             cluster: None,
         };
-        let free = self
-            .free
-            .iter()
-            .map(|v| plan.vertices[part.vertices[*v]].clone());
+        let free = self.free.iter();
+        let free = free.map(|v| plan.vertices[part.vertices[*v]].clone());
         let of = |v: usize| {
             let block = self.spaces.binary_search(&self.space[v]);
             let free = |_| self.spaces.len() + self.free.partition_point(|other| *other < v);

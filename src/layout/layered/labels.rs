@@ -247,11 +247,8 @@ impl Obstacles {
 
     /// The numbers of the rectangles that share a point with this one; a number may occur more than once.
     fn hits<'a>(&'a self, rect: &'a Rect) -> impl Iterator<Item = usize> + 'a {
-        let near = self
-            .cells_of(rect)
-            .into_iter()
-            .filter_map(|cell| self.cells.get(&cell))
-            .flatten();
+        let near = self.cells_of(rect).into_iter();
+        let near = near.filter_map(|cell| self.cells.get(&cell)).flatten();
         near.map(|&i| &self.rects[i])
             .inspect(|_| self.looks.set(self.looks.get() + 1))
             .filter(|(other, _)| touches(other, rect))

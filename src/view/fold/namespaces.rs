@@ -248,10 +248,8 @@ pub(crate) fn clusters(
 /// The namespace of each item; that of one of `kept`, and of a collapsed one beside members that were kept open, is
 /// itself.
 fn innermost_spaces(items: &[Item], levels: usize, kept: &BTreeSet<&str>) -> Vec<String> {
-    let outer: Vec<String> = items
-        .iter()
-        .map(|item| outer_space(&item.name, levels))
-        .collect();
+    let outer = items.iter();
+    let outer: Vec<String> = outer.map(|item| outer_space(&item.name, levels)).collect();
     let around: BTreeSet<&str> = outer.iter().map(String::as_str).collect();
     let own = |(item, outer): (&Item, &String)| {
         let is_around = item.kind == ItemKind::Namespace && around.contains(&*item.name);

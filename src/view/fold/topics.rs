@@ -89,11 +89,8 @@ fn image(free: &Free<'_>, topic: &str) -> Option<String> {
 
 /// The topics of each group, whose name is made different from those of all other boxes of topics.
 pub(crate) fn folds(groups: &Groups, keys: &Keys) -> Vec<Fold> {
-    let grouped: BTreeSet<Element> = groups
-        .values()
-        .flatten()
-        .map(|id| Element::Topic(*id))
-        .collect();
+    let grouped = groups.values();
+    let grouped: BTreeSet<Element> = grouped.flatten().map(|id| Element::Topic(*id)).collect();
     let others = keys
         .iter()
         .filter(|(what, _)| what.is_topic() && !grouped.contains(what));
