@@ -353,7 +353,7 @@ fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
     let ([shortest, _, longest], _) = quartiles(ticks, (ticks.len() / 4).clamp(32, 128));
     let is_usual = (15..=17).contains(&(eight / half.max(1)));
     let is_coarse = longest > 0 && (longest - shortest) / 3 <= half.max(scatter / 2);
-    // If less than half of the messages were lost, longest intervals are one period, and sums scatter by several.
+    // If less than half of the messages were lost, most intervals are one period, and sums scatter by several.
     let is_scattered = lower > TICK_NS || (many - few) / 3 > scatter / 2;
     let is_even = is_even || is_many && lower > 0 && median - lower <= lower / 4 && is_scattered;
     let are_sums_even = low > 0 && up as f64 <= EVEN_OF_TWO * low as f64 && upper <= lower * 3;
