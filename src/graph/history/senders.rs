@@ -254,11 +254,7 @@ fn gaps(times: &[Stamp]) -> Vec<usize> {
         // Stray messages before the first rhythm show none.
         let is_steady = at as u64 >= FEWEST;
         let before = usual(&times[at.saturating_sub(AROUND + 1)..at]).filter(|_| is_steady);
-        let after = usual(&times[at..times.len().min(at + AROUND + 1)]);
-        let longest = match (before, after) {
-            (Some(a), Some(b)) => Some(a.max(b)),
-            (a, b) => a.or(b),
-        };
+        let longest = before.max(usual(&times[at..times.len().min(at + AROUND + 1)]));
         if longest.is_some_and(|usual| long > usual.saturating_mul(GAP)) {
             found.push(at);
         }
@@ -345,14 +341,20 @@ fn scatter(times: &[Stamp], step: usize) -> f64 {
 fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
     let (first, last) = (*times.first()?, *times.last()?);
     let ([lower, median, upper], usual) = quartiles(times, 1);
-    let is_even = times.len() > FEWEST_INTERVALS && upper as f64 <= EVEN * lower.max(1) as f64;
+    let is_even = times.len() > FEWEST_INTERVALS && (upper as f64) < EVEN * lower as f64;
     let is_many = times.len() > 4 * FEWEST_INTERVALS;
-    // By a coarse clock, single intervals are long or short, and their sums are even, all but one tick.
-    let uneven = if is_many && !is_even { times } else { &[] };
-    let ([low, _, up], of_two) = quartiles(uneven, 2);
-    let ([few, _, many], _) = quartiles(uneven, 8);
+    let long = if is_many { times } else { &[] };
+    let ([low, _, up], of_two) = quartiles(if is_even { &[] } else { long }, 2);
+    let ([few, eight, many], of_eight) = quartiles(long, 8);
+    let (scatter, half) = (upper - lower, median / 2);
+    // By a coarse clock, intervals are long or short, and longer sums of them scatter by one tick, too; of lost messages, by more.
+    let is_tick = scatter <= TICK_NS && (scatter > half || eight / 15 < half);
+    let ticks = if is_tick { long } else { &[] };
+    let ([shortest, _, longest], _) = quartiles(ticks, (ticks.len() / 4).clamp(32, 128));
+    let is_usual = (15..=17).contains(&(eight / half.max(1)));
+    let is_coarse = longest > 0 && (longest - shortest) / 3 <= half.max(scatter / 2);
     // If less than half of the messages were lost, most intervals are one period, and sums scatter by several.
-    let is_scattered = lower > TICK_NS || (many - few) / 3 > (upper - lower) / 2;
+    let is_scattered = lower > TICK_NS || (many - few) / 3 > scatter / 2;
     let is_even = is_even || is_many && lower > 0 && median - lower <= lower / 4 && is_scattered;
     let are_sums_even = low > 0 && up as f64 <= EVEN_OF_TWO * low as f64 && upper <= lower * 3;
     Some(Stretch {
@@ -361,11 +363,12 @@ fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
         count: times.len() as u64,
         // Of few intervals the median is closer than a mean with an odd one.
         period: match is_even {
+            _ if is_coarse && !(is_even && is_usual) => of_eight / 8,
             true if is_many => usual,
             false if are_sums_even => of_two / 2,
             _ => median,
         },
-        is_even: is_even || are_sums_even,
+        is_even: is_even || are_sums_even || is_coarse,
         is_joined,
     })
 }
@@ -381,20 +384,20 @@ fn quartiles(times: &[Stamp], many: usize) -> ([i64; 3], i64) {
         return ([0; 3], 0);
     }
     let mut quartile = |part: usize| *sums.select_nth_unstable((many * part / 4).min(many - 1)).1;
-    let quartiles = [quartile(1), quartile(2), quartile(3)];
-    let median = quartiles[1];
-    let mean = |(sum, count): (i64, i64)| sum.checked_div(count).unwrap_or(median);
-    let near = sums
-        .iter()
-        .filter(|sum| (median / 2..=median / 2 * 3).contains(*sum));
-    let usual = mean(near.fold((0, 0), |all, sum| (all.0.saturating_add(*sum), all.1 + 1))).max(1);
-    let lasts = |sum: i64| sum.saturating_add(usual / 2) / usual;
+    let quartiles @ [_, median, _] = [quartile(1), quartile(2), quartile(3)];
+    let mean = |counted: &mut dyn Iterator<Item = (i64, i64)>| {
+        let add = |all: (i64, i64), one: (i64, i64)| (all.0.saturating_add(one.0), all.1 + one.1);
+        let (sum, count) = counted.fold((0, 0), add);
+        sum.checked_div(count).unwrap_or(median)
+    };
+    let is_near = |sum: &&i64| (median / 2..=median / 2 * 3).contains(*sum);
+    let usual = mean(&mut sums.iter().filter(is_near).map(|sum| (*sum, 1))).max(1);
+    // A coarse clock may lengthen or shorten one by half of it.
+    let lasts = |off: i64| 1 + off.saturating_add(off.signum() * (usual / 5 * 2)) / usual;
     // The first and the last may belong to the rates before and after.
     let ends = usize::from(many > FEWEST_INTERVALS);
     let inner = ordered.skip(ends).take(many - 2 * ends);
-    let exact = mean(inner.fold((0_i64, 0), |all, sum| {
-        (all.0.saturating_add(sum), all.1 + lasts(sum))
-    }));
+    let exact = mean(&mut inner.map(|sum| (sum, lasts(sum - usual))));
     (quartiles, exact)
 }
 
@@ -417,8 +420,7 @@ fn merged(all: Vec<Stretch>, times: &[Stamp]) -> Vec<Stretch> {
 }
 
 fn is_same(a: &Stretch, b: &Stretch) -> bool {
-    let ratio = a.period.max(1) as f64 / b.period.max(1) as f64;
-    (1.0 / SAME_RATE..=SAME_RATE).contains(&ratio)
+    a.period.max(b.period) as f64 <= SAME_RATE * a.period.min(b.period) as f64
 }
 
 #[cfg(test)]
@@ -529,6 +531,34 @@ mod tests {
         let rates: Vec<f64> = faster.iter().map(|s| libm::round(s.hz())).collect();
         assert_eq!(rates, [15.0, 30.0], "{faster:?}");
         assert!(faster.iter().all(|s| s.is_even), "{faster:?}");
+        // Faster than the clock ticks, and half a period off by one of 10 ms.
+        let faster = coarse(&[(600, 15), (900, 30)], 50_000_000);
+        let rates: Vec<f64> = faster.iter().map(|s| libm::round(s.hz())).collect();
+        assert_eq!(rates, [15.0, 30.0], "{faster:?}");
+        assert!(faster.iter().all(|s| s.is_even), "{faster:?}");
+        let off = [0, 1, 0, -1, 1].into_iter().cycle();
+        let half = (0..400).zip(off).map(|(k, off)| k * 2 + off);
+        let half: Vec<Stamp> = half.map(|ticks| Stamp(ticks * 10_000_000)).collect();
+        let half = stretches(&half);
+        assert!((half[0].hz() - 50.0).abs() < 0.2, "{half:?}");
+    }
+
+    #[test]
+    fn bursts_and_lost_messages_are_not_a_coarse_clock() {
+        // One message in 13 is lost, at random.
+        let mut noise = 7_i64;
+        let mut is_lost = || {
+            noise = (noise * 48_271) % 2_147_483_647;
+            noise % 13 == 0
+        };
+        let lossy = (0..900).filter(|_| !is_lost());
+        let lossy: Vec<Stamp> = lossy.map(|k| Stamp(k * 45_000_000)).collect();
+        let found = stretches(&lossy);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!((found[0].hz() - 1000.0 / 45.0).abs() < 0.1, "{found:?}");
+        // Three messages at once, every second.
+        let bursts: Vec<Stamp> = (0..300).map(|k| Stamp(k / 3 * 1_000_000_000)).collect();
+        assert!(stretches(&bursts).iter().all(|s| !s.is_even));
     }
 
     #[test]
