@@ -348,9 +348,11 @@ fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
     let ([few, eight, many], of_eight) = quartiles(long, 8);
     let (scatter, half) = (upper - lower, median / 2);
     // By a coarse clock, intervals are long or short, and longer sums of them scatter by one tick, too; of lost messages, by more.
+    // The clock matters if intervals scatter by more than half of one, or if eight of them take less than 7.5 medians.
     let is_tick = scatter <= TICK_NS && (scatter > half || eight / 15 < half);
     let ticks = if is_tick { long } else { &[] };
     let ([shortest, _, longest], _) = quartiles(ticks, (ticks.len() / 4).clamp(32, 128));
+    // Eight intervals take 7.5 to 8.5 medians: the usual interval is no worse than the mean, and lost messages do not count in it.
     let is_usual = (15..=17).contains(&(eight / half.max(1)));
     let is_coarse = longest > 0 && (longest - shortest) / 3 <= half.max(scatter / 2);
     // If less than half of the messages were lost, most intervals are one period, and sums scatter by several.
