@@ -84,8 +84,13 @@ fn a_node_that_declares_its_parameters_again_has_restarted() {
         ..mcap::Options::default()
     };
     fs::write(&path, mcap::write(&bag, &options)).unwrap();
-    let found = restarts(&[path], Stdio::null());
+    let found = restarts(std::slice::from_ref(&path), Stdio::null());
     assert_eq!(found, ["00:59.9  /nav restarted"]);
+    // A declaration is as exact for the first start.
+    let log = bagreel(folder.path(), &["events", path.to_str().unwrap()]);
+    let log = String::from_utf8(log.stdout).unwrap();
+    let is_start = |line: &str| line.trim().starts_with("00:10.0  /nav started");
+    assert!(log.lines().any(is_start), "{log}");
 }
 
 #[test]

@@ -397,7 +397,7 @@ pub(crate) struct Liveness {
     pub(crate) ends: Vec<Stamp>,
     /// The times at which something that shows it began, such as a rhythm.
     pub(crate) begins: Vec<Stamp>,
-    /// The times among these at which a recorder found its topics.
+    /// The times among these at which a recorder found its topics, or it declared its parameters: as it began.
     pub(crate) found: Vec<Stamp>,
     /// The last sign of its own: a message that it sent, or a statement about itself.
     pub(crate) last_sign: Option<Stamp>,

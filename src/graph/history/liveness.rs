@@ -114,7 +114,7 @@ pub(crate) fn collect(
                 if !is_rewritten || !is_from(&inference, "rosout") {
                     liveness.begins.extend(signs);
                 }
-                if is_from(&inference, "links") {
+                if is_from(&inference, "links") || is_from(&inference, "parameter_events") {
                     liveness.found.extend(signs);
                 }
             }
