@@ -351,7 +351,7 @@ impl Reader for Sqlite3Bag {
         }
         self.notices.iter().for_each(|n| clip.notice(n.clone()));
         let db = Db::open(&self.ready).map_err(|e| broken(&self.path, &e))?;
-        // SQLite returns no rows where the first page of a table lost its entries.
+        // SQLite returns no rows where the first page of a table lost its rows.
         let any = "SELECT rowid FROM messages NOT INDEXED LIMIT 1";
         if self.verify || matches!(db.first(any, &[], |row| row.integer(0)), Ok(None)) {
             check(&db, &mut clip);
