@@ -228,10 +228,8 @@ pub(crate) fn is_growing(folder: &Path) -> bool {
 
 /// Whether a file has the name of a storage file.
 pub(super) fn is_storage(path: &Path) -> bool {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let name = name.to_lowercase();
-    let name = name.strip_suffix(".zstd").unwrap_or(&name);
-    [".db3", ".mcap"].iter().any(|end| name.ends_with(end))
+    let mut endings = ["db3", "mcap", "db3.zstd", "mcap.zstd"].into_iter();
+    endings.any(|ending| ends_in(path, ending))
 }
 
 /// The longest `metadata.yaml` that is searched for names, in bytes.

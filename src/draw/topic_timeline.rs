@@ -1,7 +1,7 @@
 //! The topic timeline: the picture of a mission with few known publishers. Rows are topics over the whole
 //! time, with types and current rates; a playhead marks the window of a frame; nodes are labels below.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::base::cast;
 use crate::base::geometry::{Rect, Size};
@@ -10,7 +10,7 @@ use crate::draw::picture::PageOptions;
 use crate::draw::picture::page::{PageFrame, Strip, unit};
 use crate::draw::picture::title::Title;
 use crate::draw::scene::Scene;
-use crate::draw::style::Style;
+use crate::draw::style::{Color, Style};
 use crate::draw::text::Fonts;
 use crate::draw::timeline::Timeline;
 use crate::draw::timeline::arranged::{by_namespace, numbered, together};
@@ -231,20 +231,24 @@ impl<'a> TopicTimeline<'a> {
     ) {
         let elements = &self.source.mission.elements;
         let is_known = |id: &NodeId| !elements.seen(Element::Node(*id)).evidence.is_guess();
+        let news = frame.headlines.iter().filter_map(|h| {
+            let color = match h.kind {
+                Kind::Started => ink::ADDED,
+                Kind::Stopped => ink::REMOVED,
+                Kind::Restarted => ink::CHANGED,
+                _ => return None,
+            };
+            Some((h.what, color))
+        });
+        let news: BTreeMap<Element, Color> = news.collect();
         let color = |id: &NodeId| {
-            let mut news = frame.headlines.iter().rev();
-            let news = news.find_map(|h| match h.kind {
-                _ if h.what != Element::Node(*id) => None,
-                Kind::Started => Some(ink::ADDED),
-                Kind::Stopped => Some(ink::REMOVED),
-                Kind::Restarted => Some(ink::CHANGED),
-                _ => None,
-            });
-            news.or_else(|| (is_known(id) && is_there(id)).then_some(ink::TEXT))
+            let new = news.get(&Element::Node(*id)).copied();
+            new.or_else(|| (is_known(id) && is_there(id)).then_some(ink::TEXT))
         };
-        let (left, mut title) = (self.drawer.left, Some("nodes known"));
-        let after = left + title.map_or(0.0, |title| canvas.width(title, Type::Small)) + 1.2;
-        let mut x = self.drawer.axis.left.max(after);
+        let (left, title) = (self.drawer.left, "nodes known");
+        let after = left + canvas.width(title, Type::Small) + 1.2;
+        let begin = self.drawer.axis.left.max(after);
+        let mut x = begin;
         let end = self.options.size.w / self.scale - left;
         let y = self.drawer.end() + Sizes::SCREEN.line() + 2.0 + LABEL / 2.0;
         for own in [ink::ADDED, ink::REMOVED, ink::CHANGED, ink::TEXT] {
@@ -254,7 +258,9 @@ impl<'a> TopicTimeline<'a> {
             if !names.is_empty() {
                 let fits = |text: &str| canvas.width(text, Type::Small) <= end - x;
                 let text = fitting(&names, names.len(), fits);
-                canvas.text(left, y, Type::Small, ink::QUIET, title.take().unwrap_or(""));
+                if x <= begin {
+                    canvas.text(left, y, Type::Small, ink::QUIET, title);
+                }
                 canvas.text(x, y, Type::Small, own, &text);
                 x += canvas.width(&text, Type::Small) + 1.2;
             }

@@ -280,9 +280,9 @@ pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Ve
             }
             let times = times.into_iter();
             let times = times.filter_map(|(bag, time)| Some((bag, time?)));
-            let mut times: Vec<(usize, Stamp)> = times.collect();
+            let times: Vec<(usize, Stamp)> = times.collect();
             if times.len() > RECORDERS {
-                times.clear();
+                continue;
             }
             for (at, (bag, time)) in times.iter().enumerate() {
                 once.entry(*bag).or_default().push(*time);

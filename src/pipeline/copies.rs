@@ -58,7 +58,8 @@ pub(super) fn pairs(
     let mut pairs: Vec<ClockOffset> = recorded.offsets.iter().filter(is_one).copied().collect();
     let is_unread =
         |at: &usize| !recorded.streams[*at].latched && recorded.facts.payloads.some(*at).is_none();
-    let known: BTreeSet<[usize; 2]> = pairs.iter().map(|pair| [pair.other, pair.bag]).collect();
+    let known = pairs.iter().map(|pair| [pair.other, pair.bag]);
+    let known: BTreeSet<_> = known.flat_map(|[a, b]| [[a, b], [b, a]]).collect();
     let mut part = vec![0; inputs.len()];
     for (at, bags) in parts.iter().enumerate() {
         for bag in bags {
@@ -73,23 +74,19 @@ pub(super) fn pairs(
         let files = bags.keys().copied().filter(|bag| !inputs[*bag].is_pipe());
         let unread = files.clone().filter(|bag| bags[bag].iter().any(is_unread));
         let unread: BTreeSet<usize> = unread.collect();
-        let is_known =
-            |one: &usize, other: &usize| known.contains(&[*one.min(other), *one.max(other)]);
         if is_small {
-            let is_new = |one: &usize| {
-                files
-                    .clone()
-                    .any(|other| other != *one && !is_known(one, &other))
-            };
-            let is_compared = unread.iter().any(is_new);
-            small.extend(files.filter(|_| is_compared));
+            let is_new = |one, other| one != other && !known.contains(&[one, other]);
+            let mut unread = unread.iter();
+            if unread.any(|one| files.clone().any(|other| is_new(*one, other))) {
+                small.extend(files);
+            }
         } else {
             let times = files.filter_map(|bag| Some((*spans.some(bag)?, bag)));
-            for ([one, other], shared) in overlapping(times.collect()) {
-                let is_read = !unread.contains(&one) && !unread.contains(&other);
-                if shared.nanos() > NEAR_NS && !is_read && !is_known(&one, &other) {
-                    let pairs = large.entry([part[one], part[other]]).or_default();
-                    pairs.insert([one, other], shared);
+            for (pair, shared) in overlapping(times.collect()) {
+                let is_new = pair.iter().any(|bag| unread.contains(bag)) && !known.contains(&pair);
+                if shared.nanos() > NEAR_NS && is_new {
+                    let pairs = large.entry(pair.map(|bag| part[bag])).or_default();
+                    pairs.insert(pair, shared);
                 }
             }
         }
@@ -98,9 +95,8 @@ pub(super) fn pairs(
         let mut pairs: Vec<_> = pairs.into_iter().collect();
         pairs.sort_by_key(|(_, shared)| Reverse(shared.nanos()));
         pairs.truncate(SAMPLES);
-        pairs
-            .into_iter()
-            .map(|(bags, shared)| (bags.to_vec(), Some(shared)))
+        let pairs = pairs.into_iter();
+        pairs.map(|(bags, shared)| (bags.to_vec(), Some(shared)))
     };
     let whole = (small.into_iter().collect(), None);
     let samples = std::iter::once(whole).chain(large.into_values().flat_map(longest));
@@ -130,18 +126,15 @@ pub(super) fn pairs(
     }
     let mut all = BTreeMap::new();
     for ([one, other], (messages, ahead)) in best {
+        let spans = &spans;
         let moved = |at: usize, by| {
-            let spans = parts[at]
-                .iter()
-                .filter_map(|bag| Some((*spans.some(*bag)?, *bag)));
-            spans.map(move |(span, bag): (Span, usize)| (span.moved(by), bag))
+            let bags = parts[at].iter();
+            bags.filter_map(move |bag| Some((spans.some(*bag)?.moved(by), *bag)))
         };
         let beside = overlapping(moved(one, -ahead).chain(moved(other, 0)).collect());
         // By the first of the other's, the clock of a bag is corrected also at a time when the other did not record.
-        let first = parts[other].iter().min();
-        let firsts = first
-            .into_iter()
-            .flat_map(|first| parts[one].iter().map(|bag| [*first, *bag]));
+        let first = parts[other].iter().min().copied();
+        let firsts = parts[one].iter().filter_map(|bag| Some([first?, *bag]));
         for [before, bag] in beside.into_iter().map(|of| of.0).chain(firsts) {
             if before < bag && [part[before], part[bag]] == [other, one] {
                 let offset = ClockOffset {

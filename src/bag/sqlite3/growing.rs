@@ -19,6 +19,7 @@ use crate::base::file::with_suffix;
 const EVERY: u32 = 4;
 
 /// A database, read up to the last reported row.
+#[derive(Default)]
 pub(super) struct GrowingDb {
     path: PathBuf,
     /// The sizes and times of change of the database and its log when it was last read.
@@ -34,10 +35,9 @@ impl GrowingDb {
     pub(super) fn new(path: &Path) -> Self {
         Self {
             path: path.to_owned(),
-            seen: Vec::new(),
             looks: EVERY,
             next: i64::MIN,
-            wants: Vec::new(),
+            ..Self::default()
         }
     }
 }

@@ -1,5 +1,7 @@
 //! The paint of an element: its mark takes precedence over its state, and that over its confidence.
 
+use std::borrow::Cow;
+
 use crate::draw::scene::Stroke;
 use crate::draw::style::{Body, Change, Color, Quiet, Style};
 use crate::draw::text::Weight;
@@ -87,14 +89,14 @@ pub(crate) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
 }
 
 /// The look of what is there without activity of its own, if a box or an arrow is; `None` for a change.
-fn quiet(style: &Style, shown: &Shown) -> Option<Quiet> {
-    match (shown.mark, shown.state, shown.confidence) {
-        (Some(Mark::Away), ..) => Some(style.away()),
-        (Some(_), ..) => None,
-        (_, State::Declared, _) | (.., Confidence::Declared) => Some(style.declared.clone()),
-        (_, State::Silent, _) => Some(style.silent.clone()),
-        _ => None,
-    }
+fn quiet<'a>(style: &'a Style, shown: &Shown) -> Option<Cow<'a, Quiet>> {
+    let quiet = match (shown.mark, shown.state, shown.confidence) {
+        (Some(Mark::Away), ..) => return Some(Cow::Owned(style.away())),
+        (None, State::Declared, _) | (None, _, Confidence::Declared) => &style.declared,
+        (None, State::Silent, _) => &style.silent,
+        _ => return None,
+    };
+    Some(Cow::Borrowed(quiet))
 }
 
 /// The dashes of what is only inferred; of everything else none.

@@ -340,18 +340,18 @@ fn scatter(times: &[Stamp], step: usize) -> f64 {
 /// The stretch of a run of messages at one rate.
 fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
     let (first, last) = (*times.first()?, *times.last()?);
-    let ([lower, median, upper], usual) = quartiles(times, 1);
+    let [lower, median, upper] = quartiles(times, 1);
     let is_even = times.len() > FEWEST_INTERVALS && (upper as f64) < EVEN * lower as f64;
     let is_many = times.len() > 4 * FEWEST_INTERVALS;
     let long = if is_many { times } else { &[] };
-    let ([low, _, up], of_two) = quartiles(if is_even { &[] } else { long }, 2);
-    let ([few, eight, many], of_eight) = quartiles(long, 8);
+    let [low, two, up] = quartiles(if is_even { &[] } else { long }, 2);
+    let [few, eight, many] = quartiles(long, 8);
     let (scatter, half) = (upper - lower, median / 2);
     // By a coarse clock, intervals are long or short, and longer sums of them scatter by one tick, too; of lost messages, by more.
     // The clock matters if intervals scatter by more than half of one, or if eight of them take less than 7.5 medians.
     let is_tick = scatter <= TICK_NS && (scatter > half || eight / 15 < half);
     let ticks = if is_tick { long } else { &[] };
-    let ([shortest, _, longest], _) = quartiles(ticks, (ticks.len() / 4).clamp(32, 128));
+    let [shortest, _, longest] = quartiles(ticks, (ticks.len() / 4).clamp(32, 128));
     // Eight intervals take 7.5 to 8.5 medians: the usual interval is no worse than the mean, and lost messages do not count in it.
     let is_usual = (15..=17).contains(&(eight / half.max(1)));
     let is_coarse = longest > 0 && (longest - shortest) / 3 <= half.max(scatter / 2);
@@ -365,9 +365,9 @@ fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
         count: times.len() as u64,
         // Of few intervals the median is closer than a mean with an odd one.
         period: match is_even {
-            _ if is_coarse && !(is_even && is_usual) => of_eight / 8,
-            true if is_many => usual,
-            false if are_sums_even => of_two / 2,
+            _ if is_coarse && !(is_even && is_usual) => usual_sum(times, 8, eight) / 8,
+            true if is_many => usual_sum(times, 1, median),
+            false if are_sums_even => usual_sum(times, 2, two) / 2,
             _ => median,
         },
         is_even: is_even || are_sums_even || is_coarse,
@@ -375,32 +375,38 @@ fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
     })
 }
 
-/// The quartiles of the sums of so many intervals, and the usual sum: of intervals about as long as the median, and exactly the mean of
-/// all if each lasts for as many of these as were lost. 0 without intervals.
-fn quartiles(times: &[Stamp], many: usize) -> ([i64; 3], i64) {
-    let ordered = times.iter().zip(times.iter().skip(many));
-    let ordered = ordered.map(|(a, b)| b.since(*a));
-    let mut sums: Vec<i64> = ordered.clone().collect();
-    let many = sums.len();
-    if many == 0 {
-        return ([0; 3], 0);
-    }
-    let mut quartile = |part: usize| *sums.select_nth_unstable((many * part / 4).min(many - 1)).1;
-    let quartiles @ [_, median, _] = [quartile(1), quartile(2), quartile(3)];
-    let mean = |counted: &mut dyn Iterator<Item = (i64, i64)>| {
-        let add = |all: (i64, i64), one: (i64, i64)| (all.0.saturating_add(one.0), all.1 + one.1);
-        let (sum, count) = counted.fold((0, 0), add);
-        sum.checked_div(count).unwrap_or(median)
+/// The sums of so many consecutive intervals, in order.
+fn sums(times: &[Stamp], many: usize) -> impl ExactSizeIterator<Item = i64> + Clone {
+    let pairs = times.iter().zip(times.iter().skip(many));
+    pairs.map(|(a, b)| b.since(*a))
+}
+
+/// The quartiles of the sums of so many intervals; 0 without intervals.
+fn quartiles(times: &[Stamp], many: usize) -> [i64; 3] {
+    let mut sums: Vec<i64> = sums(times, many).collect();
+    let Some(last) = sums.len().checked_sub(1) else {
+        return [0; 3];
     };
-    let is_near = |sum: &&i64| (median / 2..=median / 2 * 3).contains(*sum);
-    let usual = mean(&mut sums.iter().filter(is_near).map(|sum| (*sum, 1))).max(1);
+    let at = |part: usize| (part * (last + 1) / 4).min(last);
+    [1, 2, 3].map(|part| *sums.select_nth_unstable(at(part)).1)
+}
+
+/// The usual sum of so many intervals, whose median is known: of intervals about as long as the median, and exactly the mean of all if
+/// each lasts for as many of these as were lost.
+fn usual_sum(times: &[Stamp], many: usize, median: i64) -> i64 {
+    let sums = sums(times, many);
+    let add = |all: (i64, i64), sum: i64, lasts: i64| (all.0.saturating_add(sum), all.1 + lasts);
+    let is_near = |sum: &i64| (median / 2..=median / 2 * 3).contains(sum);
+    let near = sums.clone().filter(is_near);
+    let (near, count) = near.fold((0, 0), |all, sum| add(all, sum, 1));
+    let near = near.checked_div(count).unwrap_or(median).max(1);
     // A coarse clock may lengthen or shorten one by half of it.
-    let lasts = |off: i64| 1 + off.saturating_add(off.signum() * (usual / 5 * 2)) / usual;
+    let lasts = |off: i64| 1 + off.saturating_add(off.signum() * (near / 5 * 2)) / near;
     // The first and the last may belong to the rates before and after.
-    let ends = usize::from(many > FEWEST_INTERVALS);
-    let inner = ordered.skip(ends).take(many - 2 * ends);
-    let exact = mean(&mut inner.map(|sum| (sum, lasts(sum - usual))));
-    (quartiles, exact)
+    let (many, ends) = (sums.len(), usize::from(sums.len() > FEWEST_INTERVALS));
+    let inner = sums.skip(ends).take(many - 2 * ends);
+    let (all, count) = inner.fold((0, 0), |all, sum| add(all, sum, lasts(sum - near)));
+    all.checked_div(count).unwrap_or(median)
 }
 
 /// Joins neighbours whose rates have the same median.

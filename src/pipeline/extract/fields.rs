@@ -294,9 +294,7 @@ impl FieldTables {
     /// rows; a topic without a decoded message has no table.
     fn finish(mut self) -> io::Result<Result<(usize, u64)>> {
         let (mut tables, mut rows) = (0, 0);
-        if let Some(failed) = self.failed.take() {
-            return Err(failed);
-        }
+        self.failed.take().map_or(Ok(()), Err)?;
         for at in 0..self.all.len() {
             if self.all[at].rows == 0 {
                 continue;
