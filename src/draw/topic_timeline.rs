@@ -188,10 +188,12 @@ impl<'a> TopicTimeline<'a> {
             ""
         };
         let signs = format!("{why}. Tick: first message; cross: last{window}.");
-        let fits = canvas.width(&signs, Type::Small) <= wide;
-        let why = canvas.cut(if fits { &signs } else { why }, Type::Small, wide);
+        let (reason, _) = why.split_once("; ").unwrap_or((why, ""));
+        let texts = [&signs, why, reason].into_iter();
+        let mut texts = texts.filter(|text| canvas.width(text, Type::Small) <= wide);
+        let why = texts.next().unwrap_or_default();
         let y = end + LABEL + 1.6 + Sizes::SCREEN.line() / 2.0;
-        canvas.text(self.drawer.left, y, Type::Small, ink::QUIET, &why);
+        canvas.text(self.drawer.left, y, Type::Small, ink::QUIET, why);
         let mut groups = Vec::new();
         if !self.options.bare {
             groups.push(self.title.ground());

@@ -6,7 +6,6 @@
 //! not cause boundaries, and the majority graph of a phase is its configuration. The result depends on the mission
 //! alone, never on `--period`.
 
-mod cells;
 mod name;
 mod partition;
 mod presence;
@@ -19,9 +18,9 @@ use self::name::PhaseNames;
 use self::partition::partition;
 use self::presence::{Presence, is_topics, presences};
 pub(crate) use self::presence::{fill, knows_publishers};
-use crate::base::time::{Span, Stamp};
+use crate::base::time::{SECOND, Span, Stamp, round_length};
 use crate::graph::history::Sending;
-use crate::graph::window::between;
+use crate::graph::window::{between, every};
 use crate::graph::{Elements, TopicId};
 use crate::mission::event_log::Phase;
 
@@ -29,6 +28,9 @@ use crate::mission::event_log::Phase;
 /// mission (one in so many): six cells of a short mission, 6 of at most 200 of a long one. A launch file starts its nodes within
 /// that time; farther starts belong to another boundary.
 const AROUND: (i64, i64) = (6_000_000_000, 33);
+
+/// The most cells: more would be finer than print, and the cost of phases grows with the square.
+const MOST_CELLS: i64 = 200;
 
 /// The configuration of a phase: its majority graph.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -46,7 +48,7 @@ pub fn phases(elements: &Elements, sending: &Sending, whole: Span) -> Vec<Phase>
         return Vec::new();
     }
     let present = presences(elements, sending, whole);
-    let cells = cells::cells(whole);
+    let cells = cells(whole);
     let widths: Vec<i64> = cells.iter().map(Span::nanos).collect();
     let rows: Vec<Vec<bool>> = present.iter().map(|p| p.cells(&cells)).collect();
     let cuts = partition(&widths, &rows);
@@ -72,6 +74,13 @@ pub(crate) fn of_spans(
     let of = |span: &Span| configuration(elements, sending, &present, *span);
     let found: Vec<Configuration> = spans.iter().map(of).collect();
     reported(spans, &found, &vec![false; spans.len()], &present)
+}
+
+/// The cells that divide `span`: 1 s if possible, as recorders find topics once a second, so that shorter ones would be noise;
+/// longer if there would be more than [`MOST_CELLS`]. They do not depend on `--period`.
+fn cells(span: Span) -> Vec<Span> {
+    let step = round_length((span.nanos().max(1) / MOST_CELLS + 1).max(SECOND));
+    every(span, step)
 }
 
 fn configuration(
@@ -186,4 +195,25 @@ fn is_same(a: &Configuration, b: &Configuration) -> bool {
         b.senders.get(topic).is_none_or(|other| other == sender)
     };
     a.names == b.names && a.senders.iter().all(agree)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The number of cells and the length of the first in seconds, for a span of this many seconds.
+    fn counted(seconds: i64) -> (usize, i64) {
+        let cells = super::cells(Span::new(Stamp(5), Stamp(5 + seconds * SECOND)));
+        (cells.len(), cells[0].nanos() / SECOND)
+    }
+
+    #[test]
+    fn cells_have_the_shortest_step_that_gives_at_most_two_hundred() {
+        assert_eq!(counted(66), (66, 1));
+        assert_eq!(counted(200), (100, 2));
+        assert_eq!(counted(330), (165, 2));
+        assert_eq!(counted(3600 * 24), (144, 600));
+        let (many, step) = counted(86_400 * 4000);
+        assert!(many <= 200 && step % 86_400 == 0, "{many} of {step}");
+    }
 }

@@ -149,7 +149,23 @@ impl<'a> Title<'a> {
             fits(&words[first..], room.1).then_some(first)
         };
         let mut words = frame.fitting(|words| first(words).is_some());
-        let second = words.split_off(first(&words).unwrap_or(words.len()));
+        let mut second = words.split_off(first(&words).unwrap_or(words.len()));
+        if let ([long], []) = (&words[..], &second[..])
+            && !fits(&words, room.0)
+        {
+            // An enumeration goes on in the second line.
+            let part = |text: &str| {
+                vec![Words {
+                    sign: long.sign,
+                    text: text.to_owned(),
+                }]
+            };
+            let commas = long.text.rmatch_indices(", ");
+            let mut halves = commas.map(|(at, comma)| long.text.split_at(at + comma.len()));
+            if let Some((begin, rest)) = halves.find(|(begin, _)| fits(&part(begin), room.0)) {
+                (words, second) = (part(begin.trim_end()), part(rest));
+            }
+        }
         let lines = [words, second].into_iter().filter(|line| !line.is_empty());
         (lines.collect(), size)
     }
