@@ -43,7 +43,7 @@ use shown::sum;
 pub use shown::{Mark, Members, Shown, ShownRuns, TopicRow};
 pub(crate) use shown::{STEPS, both, decades};
 pub use still::Presence;
-pub(crate) use still::union;
+pub(crate) use still::{headline, union};
 
 /// The part of a mission that the picture shows, and a notice for everything that it leaves out.
 pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {

@@ -188,3 +188,21 @@ fn a_mission_in_one_window_has_rates_while_they_were_sent() {
     assert!(!topics.contains("playhead"));
     assert!(svg_of("nodes").contains(">scan 5 Hz<"));
 }
+
+#[test]
+fn a_mission_on_a_column_is_told_in_whole_words() {
+    let column = |name: &str| {
+        let flags = ["--for", "column", "--period", "all"];
+        let (folder, done) = rendered(name, &flags, &["x.svg"]);
+        assert!(done.status.success(), "{}", said(&done));
+        text(&folder, "x.svg")
+    };
+    // The headline of a still is one phrase, and takes two lines.
+    let graph = column("warehouse.bag");
+    assert!(graph.contains(">31 nodes, 7 phases,<"), "{graph}");
+    assert!(graph.contains(">2 restarts, 2 topics change hands<"));
+    // Rates do not take the room of the time.
+    let topics = column("courier.mcap");
+    assert!(topics.contains(">12 topics, 8 phases<") && topics.contains(">10 … 5 Hz<"));
+    assert!(topics.contains(">1 → 0.25 Hz<") && topics.contains(">most publishers are unknown<"));
+}

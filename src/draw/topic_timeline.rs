@@ -21,7 +21,7 @@ use crate::draw::timeline::source::FigureSource;
 
 use crate::graph::{Element, ElementState, NodeId};
 use crate::mission::event_log::Kind;
-use crate::view::{Frame, View};
+use crate::view::{Frame, View, headline};
 
 /// The least and the largest number of pixels per millimetre of the drawing, so that small text has at least
 /// 9 pixels and text is not larger than titles.
@@ -116,13 +116,15 @@ impl<'a> TopicTimeline<'a> {
         }
     }
 
-    /// The timeline in window `k` of the view.
+    /// The timeline in window `k` of the view; the only one is the whole mission.
     pub(crate) fn scene(&self, k: usize) -> Scene {
         let many = self.view.frames.len();
+        if many == 1 {
+            return self.overview().scene;
+        }
         let phase = self.options.phases.get(k).map_or("", String::as_str);
-        // In a single window, rates are those while they were sent.
-        let page = |frame| self.page(frame, phase, many > 1);
-        let page = self.view.frames.get(k).map(page);
+        let page = self.view.frames.get(k);
+        let page = page.map(|frame| self.page(frame, phase, true));
         Scene {
             title: format!("{}, window {} of {many}", self.options.title(), k + 1),
             ..page.unwrap_or_default()
@@ -132,9 +134,8 @@ impl<'a> TopicTimeline<'a> {
     /// All windows in one drawing.
     pub(crate) fn overview(&self) -> Overview {
         let mut whole = Frame::empty(0, self.source.span());
-        let length = words::duration(whole.span.nanos());
         whole.messages = self.source.mission.messages;
-        whole.note = format!("{} over {length}", words::count(self.topics, "topic"));
+        whole.caption = headline(self.source.mission, words::count(self.topics, "topic"));
         Overview {
             scene: Scene {
                 title: format!("Topics over time of {}", self.options.title()),

@@ -74,7 +74,7 @@ pub(super) fn still(mut view: View, mission: &Mission) -> View {
     let mut frame = Frame {
         messages: mission.messages,
         counts: Counts::of(&headlines),
-        caption: headline(mission, roles(&view, mission)),
+        caption: headline(mission, words::count(roles(&view, mission), "node")),
         headlines,
         ..Frame::empty(0, mission.span)
     };
@@ -306,8 +306,8 @@ fn roles(view: &View, mission: &Mission) -> usize {
     members.filter_map(role).collect::<BTreeSet<&str>>().len()
 }
 
-/// The headline: `31 nodes, 7 phases, 2 restarts, 2 topics change hands`.
-fn headline(mission: &Mission, nodes: usize) -> Vec<Phrase> {
+/// The headline of a whole mission with so many elements: `31 nodes, 7 phases, 2 restarts, 2 topics change hands`.
+pub(crate) fn headline(mission: &Mission, elements: String) -> Vec<Phrase> {
     let many = |kind: Kind| {
         let events = mission.log.headlines(mission.span);
         events.filter(|(_, event)| event.kind == kind).count()
@@ -316,7 +316,7 @@ fn headline(mission: &Mission, nodes: usize) -> Vec<Phrase> {
     let hands = many(Kind::HandedOver);
     let change = if hands == 1 { "changes" } else { "change" };
     let parts = [
-        (true, words::count(nodes, "node")),
+        (true, elements),
         (phases > 1, words::count(phases, "phase")),
         (restarts > 0, words::count(restarts, "restart")),
         (
