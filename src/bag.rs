@@ -4,42 +4,37 @@
 //! one file below `bag/` and one row in `FORMATS`.
 
 mod adapters;
-mod checksum;
 mod chunked;
 pub(crate) mod decompress;
-mod deferred;
 mod folder;
 mod input;
 mod mcap;
 mod model;
-pub(crate) mod moved;
 mod rosbag1;
 mod rosbag2;
 pub(crate) mod source;
-mod split;
 #[cfg(feature = "sqlite")]
 mod sqlite3;
 pub(crate) mod straight;
-mod unknown;
 mod zstd;
 
 use std::path::{Path, PathBuf};
 
-use crate::base::error::{Error, Result};
+use input::{HEAD, SEARCHED, closed, explain, head, last, place};
 
-pub(crate) use adapters::known_span;
-pub(crate) use deferred::open_each;
+use crate::base::error::{Error, Result};
+use crate::base::time::Span;
+
+pub(crate) use adapters::{Moved, known_span};
 pub(crate) use folder::{Recording, parts_of, plain, recordings, written};
 pub(crate) use input::BagPlace;
 pub use input::{FormatRow, Input, file_name, size_on_disk};
-use input::{HEAD, SEARCHED, closed, head, last, place};
 pub(crate) use model::Growing;
 #[doc(hidden)]
 pub use model::Growth;
 pub use model::{
     Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink, Tier, Want,
 };
-use unknown::explain;
 
 /// Every format that can be read.
 pub const FORMATS: &[FormatRow] = &[
@@ -82,7 +77,7 @@ pub fn sniff(input: &Input) -> Result<InputKind> {
 /// The format of an input: by its first bytes or, if these are of no known kind, by a chunk behind them or its last ones.
 fn recognized(place: &mut BagPlace, head: &[u8]) -> Result<Option<&'static FormatRow>> {
     let row = FORMATS.iter().find(|row| (row.sniff)(place, head));
-    if row.is_some() || unknown::is_known(head) {
+    if row.is_some() || input::is_known(head) {
         return Ok(row);
     }
     let bytes = [&input::head(place, SEARCHED)?[..], &last(place)].concat();
@@ -144,4 +139,73 @@ fn fixed(input: &Input) -> Error {
     let what = "it cannot be followed while it grows";
     let hint = "give a `.bag.active`, `.bag`, `.mcap` or `.db3` file, or a rosbag2 folder";
     Error::unsupported(input.name(), what, hint)
+}
+
+// Many bags, only a few of them open at a time: some systems allow a process only 256 open files.
+
+/// The number of bags that stay open until they are read; each may be a folder that keeps as many files open.
+const STAY_OPEN: usize = 8;
+
+/// A bag that is opened on demand.
+struct Deferred {
+    input: Input,
+    options: OpenOptions,
+    /// The open reader, if there is one.
+    reader: Option<Box<dyn Reader>>,
+}
+
+/// The readers of `inputs`, in order; each is opened once up front, so that an input that is not a bag is reported
+/// immediately.
+pub(crate) fn open_each(
+    inputs: impl IntoIterator<Item = Input>,
+    options: &OpenOptions,
+) -> impl Iterator<Item = Result<Box<dyn Reader>>> {
+    inputs.into_iter().enumerate().map(|(place, input)| {
+        let reader = if place < STAY_OPEN {
+            Some(open(&input, options)?)
+        } else {
+            sniff(&input)?;
+            None
+        };
+        let options = options.clone();
+        Ok(Box::new(Deferred {
+            input,
+            options,
+            reader,
+        }) as Box<dyn Reader>)
+    })
+}
+
+impl Deferred {
+    /// What a reader that is open now says.
+    fn ask<T>(&self, ask: impl Fn(&dyn Reader) -> T) -> Option<T> {
+        match &self.reader {
+            Some(reader) => Some(ask(reader.as_ref())),
+            // Errors are reported when the bag is read.
+            None => Some(ask(open(&self.input, &self.options).ok()?.as_ref())),
+        }
+    }
+}
+
+impl Reader for Deferred {
+    fn is_straight(&self) -> bool {
+        self.ask(|reader| reader.is_straight()).unwrap_or(true)
+    }
+
+    fn stated(&self) -> Option<Span> {
+        self.ask(|reader| reader.stated()).flatten()
+    }
+
+    fn span(&mut self) -> Result<Option<Span>> {
+        match &mut self.reader {
+            Some(reader) => reader.span(),
+            None => open(&self.input, &self.options)?.span(),
+        }
+    }
+
+    fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
+        let reader = self.reader.take();
+        let mut reader = reader.map_or_else(|| open(&self.input, &self.options), Ok)?;
+        reader.read(range, sink)
+    }
 }

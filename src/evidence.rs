@@ -24,19 +24,16 @@ pub(crate) mod spread;
 pub(crate) mod syntax;
 pub(crate) mod times;
 pub(crate) mod unknown;
-pub(crate) mod values;
 
 pub use observation::{Confidence, EvidenceLine};
 pub use source::Source;
 
-use serde::{Deserialize, Serialize};
-
 use message::dynamic;
+use serde::{Deserialize, Serialize};
 use source::Read::{Log, Parameters, Payload};
 use source::{
-    NOTHING, action, connection, contract, conventions, diagnostics, discovery, echo, equal_stamps,
-    lifecycle, log_text, parameters, payload, qos, recorder, rosgraph, rosout, service_event,
-    sim_time, sister, statistics,
+    NOTHING, action, connection, contract, conventions, diagnostics, echo, equal_stamps, events,
+    log_text, payload, recorder, rosgraph, rosout, sim_time, statistics,
 };
 
 /// A set of kinds of evidence: bits at the indices of rows in [`SOURCES`].
@@ -166,19 +163,19 @@ pub const SOURCES: &[Source] = sources! {
           holds: true,
           conclude: &[rosgraph::conclude] }
     "discovery" "`ros_discovery_info` (`rmw_dds_common/msg/ParticipantEntitiesInfo`)"
-        { reads: &[(&[discovery::SHAPE], Payload(discovery::read))] }
+        { reads: &[(&[rosgraph::PARTICIPANT], Payload(rosgraph::read_participant))] }
     "lifecycle" "`<node>/transition_event` (`lifecycle_msgs/msg/TransitionEvent`)"
-        { reads: &[(&[lifecycle::SHAPE], Payload(lifecycle::read))], own: true }
+        { reads: &[(&[events::TRANSITION], Payload(events::read_transition))], own: true }
     "service_event" "`<service>/_service_event` of service introspection"
-        { reads: &[(&[service_event::SHAPE], Payload(service_event::read))] }
+        { reads: &[(&[events::SERVICE_EVENT], Payload(events::read_service))] }
     "qos" "offered quality of service in ROS 2 recordings"
-        { announced: Some(qos::announced), conclude: &[qos::conclude] }
+        { announced: Some(connection::announced), conclude: &[connection::conclude_offers] }
     "parameter_events" "`rcl_interfaces/msg/ParameterEvent`"
-        { reads: &[(&[parameters::SHAPE], Parameters(parameters::read_node))] }
+        { reads: &[(&[events::SHAPE], Parameters(events::read_node))] }
     "qos_overrides" "`qos_overrides.<topic>` in parameter events, which rclcpp declares with each end"
-        { reads: &[(&[parameters::SHAPE], Parameters(parameters::read_overrides))] }
+        { reads: &[(&[events::SHAPE], Parameters(events::read_overrides))] }
     "sim_time" "`use_sim_time` in parameter events, in ROS 1 stamps in the time of `/clock`: such a node subscribes to it"
-        { reads: &[(&[parameters::SHAPE], Parameters(sim_time::read_parameters)), (&[sim_time::CLOCK], Payload(sim_time::read_clock))],
+        { reads: &[(&[events::SHAPE], Parameters(sim_time::read_parameters)), (&[sim_time::CLOCK], Payload(sim_time::read_clock))],
           conclude: &[sim_time::conclude],
           own: true }
     "links" "log records of roscpp about its connections, and of recorders about the topics they find"
@@ -224,7 +221,7 @@ pub const SOURCES: &[Source] = sources! {
     "tf_pair" "a subscriber of `/tf` also subscribes to `/tf_static`, and vice versa"
         { conclude: &[conventions::tf_pair] }
     "sister" "a node whose twin in another namespace publishes the same and subscribes to more"
-        { conclude: &[sister::conclude] }
+        { conclude: &[conventions::sister] }
     "anonymous" "the start inside an anonymous name (`_PID_MILLISECONDS`, `_NANOSECONDS`)"
         { conclude: &[conventions::anonymous] }
     "recorder" "the recorder subscribes to everything it records; its log records name its source file"

@@ -27,7 +27,7 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
         &[
             "base/csv",
             "base/yaml",
-            "evidence/source/qos",
+            "evidence/source/connection",
             "evidence/given",
             "export/html",
             "gate/baseline",

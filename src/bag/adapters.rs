@@ -1,10 +1,10 @@
-//! Sinks between a reader and its target sink: clipping to a range, batching, crossing threads.
+//! Adapters between a reader and its target sink: clipping to a range, moved times, batching, crossing threads.
 
 use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
-use crate::bag::model::{ConnectionId, Message, Reader, Sink};
+use crate::bag::model::{ConnectionId, Message, Reader, Report, Sink};
 use crate::bag::straight::pass;
 use crate::base::error::Result;
 use crate::base::ids::ById;
@@ -235,106 +235,78 @@ impl Gather {
     }
 }
 
-/// The findings of one thread, to be reported to a sink on another.
-#[derive(Default)]
-struct Delivery {
-    /// Runs of stamps: the connection, or `None` for the beginning of a part of the file.
-    runs: Vec<(Option<ConnectionId>, usize, bool)>,
-    stamps: Vec<Stamp>,
-    sizes: Vec<u32>,
-    messages: Vec<(ConnectionId, Stamp, usize, u32)>,
-    bytes: Vec<u8>,
-    notices: Vec<Notice>,
+/// A finding of one thread, to be reported to a sink on another.
+enum Finding {
+    Part,
+    Stamps(ConnectionId, Vec<Stamp>, Option<Vec<u32>>),
+    /// A message with its payload.
+    Message(ConnectionId, Stamp, u32, Vec<u8>),
+    Notice(Notice),
 }
 
-impl Delivery {
-    fn is_full(&self) -> bool {
-        self.stamps.len() > 1 << 14 || self.bytes.len() > 1 << 17
-    }
-
-    fn report(&self, sink: &mut dyn Sink) {
-        let (mut at, mut size_at, mut byte_at) = (0, 0, 0);
-        for (id, count, sized) in &self.runs {
-            let Some(id) = id else {
-                sink.part();
-                continue;
-            };
-            let sizes = sized.then(|| &self.sizes[size_at..size_at + count]);
-            sink.stamps(*id, &self.stamps[at..at + count], sizes);
-            at += count;
-            size_at += if *sized { *count } else { 0 };
-        }
-        for (connection, time, len, size) in &self.messages {
-            sink.message(Message {
-                connection: *connection,
-                time: *time,
-                data: &self.bytes[byte_at..byte_at + len],
-                size: *size,
-            });
-            byte_at += len;
-        }
-        for notice in &self.notices {
-            sink.notice(notice.clone());
+impl Finding {
+    fn report(self, sink: &mut dyn Sink) {
+        match self {
+            Self::Part => sink.part(),
+            Self::Stamps(id, stamps, sizes) => sink.stamps(id, &stamps, sizes.as_deref()),
+            Self::Message(connection, time, size, data) => sink.message(Message {
+                connection,
+                time,
+                data: &data,
+                size,
+            }),
+            Self::Notice(notice) => sink.notice(notice),
         }
     }
 }
 
-/// A part of a thread's findings, or the end of its work on one part.
-enum Sent {
-    Some(Delivery),
-    Done,
-}
+/// The most bytes of stamps and payloads that are sent at once, and that a single finding counts as at least.
+const MOST_SENT: usize = 1 << 17;
+const LEAST_SENT: usize = 1 << 6;
 
+/// A sink that sends findings to another thread: many at once, and `None` after those of each part.
 struct BatchSender {
-    batch: Delivery,
-    to: SyncSender<Sent>,
-    /// Whether the receiver has hung up.
-    is_closed: bool,
+    batch: Vec<Finding>,
+    bytes: usize,
+    to: SyncSender<Option<Vec<Finding>>>,
 }
 
 impl BatchSender {
-    fn flush(&mut self) {
-        let batch = std::mem::take(&mut self.batch);
-        self.is_closed |= self.to.send(Sent::Some(batch)).is_err();
-    }
-
-    fn flush_if_full(&mut self) {
-        if self.batch.is_full() {
+    fn add(&mut self, finding: Finding, bytes: usize) {
+        self.batch.push(finding);
+        self.bytes += bytes.max(LEAST_SENT);
+        if self.bytes > MOST_SENT {
             self.flush();
         }
     }
 
-    fn done(&mut self) {
-        self.flush();
-        self.is_closed |= self.to.send(Sent::Done).is_err();
+    fn flush(&mut self) {
+        self.bytes = 0;
+        let batch = std::mem::take(&mut self.batch);
+        // A receiver that has hung up needs no more.
+        let _ = self.to.send(Some(batch));
     }
 }
 
 impl Sink for BatchSender {
     fn part(&mut self) {
-        self.batch.runs.push((None, 0, false));
+        self.add(Finding::Part, 0);
     }
 
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
-        self.batch
-            .runs
-            .push((Some(connection), stamps.len(), sizes.is_some()));
-        self.batch.stamps.extend_from_slice(stamps);
-        self.batch.sizes.extend_from_slice(sizes.unwrap_or(&[]));
-        self.flush_if_full();
+        let sizes = sizes.map(<[u32]>::to_vec);
+        let finding = Finding::Stamps(connection, stamps.to_vec(), sizes);
+        self.add(finding, size_of_val(stamps));
     }
 
     fn message(&mut self, message: Message<'_>) {
-        let len = message.data.len();
-        self.batch
-            .messages
-            .push((message.connection, message.time, len, message.size));
-        self.batch.bytes.extend_from_slice(message.data);
-        self.flush_if_full();
+        let Message { time, size, .. } = message;
+        let finding = Finding::Message(message.connection, time, size, message.data.to_vec());
+        self.add(finding, message.data.len());
     }
 
     fn notice(&mut self, notice: Notice) {
-        self.batch.notices.push(notice);
+        self.add(Finding::Notice(notice), 0);
     }
 }
 
@@ -360,41 +332,124 @@ pub(crate) fn in_order(
         return;
     }
     thread::scope(|scope| {
-        let lines: Vec<Receiver<Sent>> = (0..threads)
-            .map(|first| {
-                let (to, from) = sync_channel(8);
-                scope.spawn(move || work_on(first, count, threads, work, to));
-                from
-            })
-            .collect();
+        // Each thread works on every so-many-th part.
+        let work_from = |first: usize| {
+            let (to, from) = sync_channel(8);
+            scope.spawn(move || {
+                let mut sender = BatchSender {
+                    batch: Vec::new(),
+                    bytes: 0,
+                    to,
+                };
+                for part in (first..count).step_by(threads) {
+                    work(part, &mut sender);
+                    sender.flush();
+                    if sender.to.send(None).is_err() {
+                        break;
+                    }
+                }
+            });
+            from
+        };
+        let lines: Vec<Receiver<_>> = (0..threads).map(work_from).collect();
         for part in 0..count {
-            let line = &lines[part % threads];
-            while let Ok(Sent::Some(batch)) = line.recv() {
-                batch.report(sink);
+            while let Ok(Some(batch)) = lines[part % threads].recv() {
+                for finding in batch {
+                    finding.report(sink);
+                }
             }
             after(part, sink);
         }
     });
 }
 
-/// Works on every `step`th part from `first` on.
-fn work_on(
-    first: usize,
-    count: usize,
-    step: usize,
-    work: &(dyn Fn(usize, &mut dyn Sink) + Sync),
-    to: SyncSender<Sent>,
-) {
-    let mut sender = BatchSender {
-        batch: Delivery::default(),
-        to,
-        is_closed: false,
-    };
-    for part in (first..count).step_by(step) {
-        work(part, &mut sender);
-        sender.done();
-        if sender.is_closed {
-            break;
+// A bag whose recorder's clock was wrong by a known time: a reader that moves all its times.
+
+/// A reader of another one's bag at other times.
+pub(crate) struct Moved {
+    reader: Box<dyn Reader>,
+    /// The time by which its times are moved, in nanoseconds.
+    by: i64,
+}
+
+impl Moved {
+    pub(crate) fn new(reader: Box<dyn Reader>, by: i64) -> Self {
+        Self { reader, by }
+    }
+}
+
+impl Reader for Moved {
+    fn is_straight(&self) -> bool {
+        self.reader.is_straight()
+    }
+
+    fn span(&mut self) -> Result<Option<Span>> {
+        let span = self.reader.span()?;
+        Ok(span.map(|span| span.moved(self.by)))
+    }
+
+    fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
+        let range = range.map(|range| range.moved(self.by.saturating_neg()));
+        self.reader
+            .read(range, &mut MovedSink { sink, by: self.by })
+    }
+}
+
+/// A sink that moves all times.
+struct MovedSink<'a> {
+    sink: &'a mut dyn Sink,
+    by: i64,
+}
+
+impl Sink for MovedSink<'_> {
+    fn behind(&mut self) -> Option<&mut dyn Sink> {
+        Some(&mut *self.sink)
+    }
+
+    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
+        let stamps: Vec<Stamp> = stamps.iter().map(|time| time.plus(self.by)).collect();
+        self.sink.stamps(connection, &stamps, sizes);
+    }
+
+    fn message(&mut self, message: Message<'_>) {
+        let time = message.time.plus(self.by);
+        self.sink.message(Message { time, ..message });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bag::{Input, OpenOptions, open};
+
+    /// The first and the last time of a bag.
+    struct Ends(Option<(Stamp, Stamp)>);
+
+    impl Sink for Ends {
+        fn stamps(&mut self, _: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
+            for time in stamps {
+                let ends = self.0.get_or_insert((*time, *time));
+                *ends = (ends.0.min(*time), ends.1.max(*time));
+            }
         }
+    }
+
+    fn ends(by: i64, range: Option<Span>) -> (Option<Span>, (Stamp, Stamp)) {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
+        let reader = open(&Input::Path(path.into()), &OpenOptions::default()).unwrap();
+        let mut reader = Moved::new(reader, by);
+        let mut sink = Ends(None);
+        reader.read(range, &mut sink).unwrap();
+        (reader.span().unwrap(), sink.0.unwrap())
+    }
+
+    #[test]
+    fn span_range_and_messages_are_moved_alike() {
+        let (span, (first, last)) = ends(0, None);
+        let (at, (from, to)) = ends(5, None);
+        assert_eq!(at, span.map(|span| span.moved(5)));
+        assert_eq!((from, to), (first.plus(5), last.plus(5)));
+        let only = Span::new(first.plus(5), first.plus(6));
+        assert_eq!(ends(5, Some(only)).1, (first.plus(5), first.plus(5)));
     }
 }

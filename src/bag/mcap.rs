@@ -1,28 +1,28 @@
-//! The grammar of MCAP files.
+//! The grammar of MCAP files, and their summary.
 //!
 //! The format: <https://mcap.dev/spec>.
 
 mod records;
-mod summary;
 mod verify;
 
 use std::collections::HashMap;
 use std::io;
+use std::ops::Range;
 use std::path::Path;
 
 use mcap::MAGIC;
 use mcap::records::op;
+use records::{DATA_END, ENTRY, FOOTER, FieldCursor, HEAD, SchemaRecord};
 
 use crate::bag::chunked::{
-    self, ChunkPlan, Connections, Grammar, Index, IndexSum, NoRecord, RecordHead, SecondReading,
-    Unindexed,
+    self, Chunk, ChunkPlan, Connections, Counts, Grammar, Index, IndexSum, NoRecord, RecordHead,
+    RecordKind, SecondReading, Tail, Unindexed, pass, walk,
 };
 use crate::bag::input::FormatRow;
-use crate::bag::model::{Connection, Sink};
-use crate::bag::source::{ByteStream, FileSource};
+use crate::bag::model::{Connection, MOST_PAYLOAD, Sink};
+use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
 use crate::base::error::Result;
 use crate::base::time::Stamp;
-use records::{FieldCursor, SchemaRecord};
 
 /// MCAP files.
 pub(crate) const FORMAT: FormatRow = FormatRow {
@@ -123,15 +123,15 @@ impl Grammar for Mcap {
     }
 
     fn plan(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexed>> {
-        summary::read(source)
+        read(source)
     }
 
     fn is_summed(source: Option<&FileSource>) -> bool {
-        source.is_none_or(|source| !matches!(summary::data_crc(source), Ok(Some(0))))
+        source.is_none_or(|source| !matches!(data_crc(source), Ok(Some(0))))
     }
 
     fn is_ended(source: &FileSource) -> bool {
-        matches!(summary::data_crc(source), Ok(Some(_)))
+        matches!(data_crc(source), Ok(Some(_)))
     }
 
     /// The facts in the file's header.
@@ -172,4 +172,254 @@ impl Grammar for Mcap {
 fn entry(bytes: &[u8]) -> Option<(Stamp, u64)> {
     let mut cursor = FieldCursor(bytes);
     Some((Stamp::from_nanos(cursor.u64()?), cursor.u64()?))
+}
+
+// The summary at the end of an MCAP file: its channels and chunks, and whether they are reliable.
+
+/// The most channels: as many as there are ids.
+const MOST_CHANNELS: usize = 1 << 16;
+
+/// Reads the summary at the end of `source`.
+fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexed>> {
+    let (start, crc) = match footer(source)? {
+        Ok(found) => found,
+        Err(reason) => return Ok(Err(reason)),
+    };
+    let mut summary = Summary::default();
+    summary.tail.plan.body = MAGIC.len() as u64..start;
+    let end = source.len() - CRC_AND_CLOSING;
+    let mut stream = ByteStream::of_file(source, start, end, FAR);
+    stream.sum_up();
+    match summary.records(&mut stream) {
+        Ok(()) => {}
+        Err(NoRecord::Io(e)) => return Err(e),
+        Err(_) => return Ok(Unindexed::wrong("its summary is damaged")),
+    }
+    if crc != 0 && stream.sum() != Some(crc) {
+        return Ok(Unindexed::wrong("the checksum of its summary is wrong"));
+    }
+    Ok(summary.into_plan(source))
+}
+
+/// The number of bytes of a footer record and of the closing bytes of the file.
+const END: usize = 9 + 20 + 8;
+
+/// The number of bytes from the checksum of the summary to the end of the file, which the checksum does not cover.
+const CRC_AND_CLOSING: u64 = 4 + 8;
+
+/// The position of the summary and its checksum, 0 for none.
+fn footer(source: &FileSource) -> io::Result<Result<(u64, u32), Unindexed>> {
+    let mut bytes = [0; END];
+    let Some(at) = source.len().checked_sub(bytes.len() as u64) else {
+        return Ok(Unindexed::wrong("it is cut"));
+    };
+    let got = source.read_at(at, &mut bytes)?;
+    let mut cursor = FieldCursor(&bytes[..got]);
+    let head = (cursor.u8(), cursor.u64());
+    let fields = (cursor.u64(), cursor.u64(), cursor.u32());
+    let (Some(start), Some(_), Some(crc)) = fields else {
+        return Ok(Unindexed::wrong("its end is missing"));
+    };
+    if !bytes[..got].ends_with(MAGIC) || head != (Some(op::FOOTER), Some(FOOTER)) {
+        return Ok(Unindexed::wrong("its end is missing"));
+    }
+    Ok(match start {
+        0 => Unindexed::missing("it has no summary"),
+        n if n < MAGIC.len() as u64 || n > at => {
+            Unindexed::wrong("its summary lies outside the file")
+        }
+        n => Ok((n, crc)),
+    })
+}
+
+/// The number of bytes of the record that ends the data.
+const DATA_END_RECORD: usize = 9 + 4;
+
+/// The CRC-32 of all data as stated by the record before the summary or the footer, 0 for none; `None` if that record
+/// is missing.
+fn data_crc(source: &FileSource) -> io::Result<Option<u32>> {
+    let end = match footer(source)? {
+        Ok((start, _)) => start,
+        Err(_) => source.len().saturating_sub(END as u64),
+    };
+    let mut bytes = [0; DATA_END_RECORD];
+    let at = end.saturating_sub(DATA_END_RECORD as u64);
+    let got = source.read_at(at, &mut bytes)?;
+    let mut cursor = FieldCursor(&bytes[..got]);
+    let is_end = (cursor.u8(), cursor.u64()) == (Some(op::DATA_END), Some(DATA_END));
+    Ok(cursor.u32().filter(|_| is_end))
+}
+
+/// The part of a summary that has been read.
+#[derive(Default)]
+struct Summary {
+    tail: Tail<Mcap>,
+    statistics: Option<Counts>,
+    /// Whether a channel refers to a schema that the summary does not repeat.
+    untyped: bool,
+}
+
+impl Summary {
+    /// Takes the records up to the footer. All of them are kept in memory, so none may be long.
+    fn records(&mut self, stream: &mut ByteStream<'_>) -> Result<(), NoRecord> {
+        let mut channels: Vec<Vec<u8>> = Vec::new();
+        let stop = walk(stream, u64::MAX, |stream| {
+            let (kind, len) = records::head(stream)?;
+            if kind == op::FOOTER {
+                // Up to the end of the bytes that the checksum covers.
+                stream.skip(FOOTER)?;
+                return Err(NoRecord::End);
+            }
+            if len > MOST_PAYLOAD as u64 {
+                return Err(NoRecord::Broken);
+            }
+            let wanted = usize::try_from(len).unwrap_or(usize::MAX);
+            let record = stream.peek(wanted)?;
+            if record.len() < wanted {
+                return Err(NoRecord::Cut);
+            }
+            match kind {
+                op::SCHEMA => self.tail.describe(&Described::Schema, record)?,
+                // A channel may precede its schema.
+                op::CHANNEL if channels.len() < MOST_CHANNELS => channels.push(record.to_vec()),
+                op::STATISTICS => self.statistics = records::counts(record),
+                op::CHUNK_INDEX => {
+                    let (place, times, counts) = chunk_index(record).ok_or(NoRecord::Broken)?;
+                    self.tail.list(place, times, counts)?;
+                }
+                _ => {}
+            }
+            pass(stream, len)
+        });
+        let NoRecord::End = stop else {
+            return Err(stop);
+        };
+        for channel in &channels {
+            let schema = channel.get(2..4).map(FieldCursor);
+            let schema = schema.and_then(|mut id| id.u16()).unwrap_or(0);
+            self.untyped |= schema > 0 && !self.tail.grammar.schemas.contains_key(&schema);
+            self.tail.describe(&Described::Channel, channel)?;
+        }
+        Ok(())
+    }
+
+    /// Sorts the chunks and decides whether they contain all messages. Every part of a summary is optional.
+    fn into_plan(mut self, source: &FileSource) -> Result<ChunkPlan, Unindexed> {
+        self.tail.sort();
+        let chunks = &self.tail.plan.chunks;
+        let promised = chunks.iter().filter_map(|c| Some(c.promised?.messages));
+        let known: u64 = promised.sum();
+        let Some(all) = &self.statistics else {
+            return Unindexed::missing("its summary has no statistics to check its index by");
+        };
+        if chunks.is_empty() && all.chunks > 0 {
+            return Unindexed::missing("its summary has no index of its chunks");
+        }
+        if chunks.is_empty() && all.messages > 0 {
+            return Unindexed::missing("its messages are outside chunks");
+        }
+        if all.chunks as usize != chunks.len() {
+            return Unindexed::wrong("its index does not list all of its chunks");
+        }
+        if all.messages != known {
+            are_counted(source, chunks)?;
+            gaps(source, &self.tail.plan)?;
+            return Unindexed::wrong("its index and its statistics disagree");
+        }
+        let undescribed = self.tail.is_described();
+        let described = self.tail.plan.connections.list().len();
+        if self.untyped || undescribed.is_err() && described < all.channels as usize {
+            return Unindexed::missing("its summary does not repeat all channels and schemas");
+        }
+        undescribed?;
+        gaps(source, &self.tail.plan)?;
+        Ok(self.tail.plan)
+    }
+}
+
+/// Checks that the offsets of the message indexes of these chunks determine the numbers of their messages.
+fn are_counted(source: &FileSource, chunks: &[Chunk]) -> Result<(), Unindexed> {
+    let first = chunks.iter().find(|chunk| !chunk.index.is_empty());
+    let is_extended = |chunk: &Chunk| {
+        let mut stream = ByteStream::of_file(source, chunk.index.start, chunk.index.end, NEAR);
+        let first = Mcap::next(&mut stream).map(|first| (first.kind, first.len));
+        matches!(first, Ok((RecordKind::Index { count, .. }, len)) if 2 + 4 + u64::from(count) * (ENTRY as u64) < len)
+    };
+    if first.is_some_and(is_extended) {
+        Unindexed::missing("its message indexes have fields of a later version of the format")
+    } else if chunks.iter().any(|chunk| chunk.promised.is_none()) {
+        Unindexed::missing("its chunks have no message index")
+    } else {
+        Ok(())
+    }
+}
+
+/// Checks that between the chunks, where other records may occur, there are no messages missing from the summary.
+fn gaps(source: &FileSource, plan: &ChunkPlan) -> Result<(), Unindexed> {
+    let mut free = plan.body.start;
+    let ends = plan.chunks.iter().map(|c| (c.start, c.end));
+    for (start, end) in ends.chain([(plan.body.end, plan.body.end)]) {
+        if start < free || end > plan.body.end {
+            return Unindexed::wrong("its index lists chunks at impossible positions");
+        }
+        let mut stream = ByteStream::of_file(source, free, start, NEAR);
+        let (mut hidden, mut loose) = (false, false);
+        // Bytes that are not a record contain no readable message.
+        walk(&mut stream, start, |stream| {
+            let record = Mcap::next(stream)?;
+            hidden |= matches!(record.kind, RecordKind::Chunk(_) | RecordKind::Index { .. });
+            loose |= matches!(record.kind, RecordKind::Message(_));
+            pass(stream, record.len)
+        });
+        if hidden {
+            return Unindexed::wrong("its summary does not list all of its messages");
+        }
+        if loose {
+            return Unindexed::missing("some of its messages are outside chunks");
+        }
+        free = end;
+    }
+    Ok(())
+}
+
+/// The places of a chunk and its index, its times and its message counts in a chunk index record.
+type Listed = ((u64, Range<u64>), (Stamp, Stamp), Option<Vec<(u32, u32)>>);
+
+/// The chunk of a chunk index record.
+fn chunk_index(record: &[u8]) -> Option<Listed> {
+    let mut cursor = FieldCursor(record);
+    let (first, last) = (cursor.u64()?, cursor.u64()?);
+    let (start, len) = (cursor.u64()?, cursor.u64()?);
+    let offsets = cursor.bytes()?;
+    let index_len = cursor.u64()?;
+    let _compression = cursor.bytes()?;
+    let _sizes = (cursor.u64()?, cursor.u64()?);
+    let behind = start.checked_add(len)?;
+    let end = behind.checked_add(index_len)?;
+    if len < HEAD {
+        return None;
+    }
+    let times = (Stamp::from_nanos(first), Stamp::from_nanos(last));
+    Some(((start, behind..end), times, counts(offsets, behind, end)))
+}
+
+/// The message counts, computed from the offsets of the message indexes of a chunk's channels, which are contiguous:
+/// 15 bytes, plus 16 per message. `None` if they are not contiguous, or if there are none.
+fn counts(offsets: &[u8], start: u64, end: u64) -> Option<Vec<(u32, u32)>> {
+    let mut places = Vec::with_capacity(offsets.len() / 10);
+    let mut cursor = FieldCursor(offsets);
+    while let (Some(channel), Some(at)) = (cursor.u16(), cursor.u64()) {
+        places.push((at, channel));
+    }
+    places.sort_unstable();
+    if places.first()?.0 != start {
+        return None;
+    }
+    let ends = places.iter().skip(1).map(|p| p.0).chain([end]);
+    let count = |((at, channel), end): (&(u64, u16), u64)| {
+        let entries = end.checked_sub(*at)?.checked_sub(15)?;
+        let count = u32::try_from(entries / 16).ok()?;
+        (entries % 16 == 0).then_some((u32::from(*channel), count))
+    };
+    places.iter().zip(ends).map(count).collect()
 }

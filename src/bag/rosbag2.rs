@@ -1,26 +1,26 @@
-//! rosbag2 folders: the storage files in them, read as one recording, with `metadata.yaml` as a hint.
-
-mod growing;
-mod metadata;
+//! rosbag2 folders, finished or growing: the storage files in them, read as one recording, with `metadata.yaml` as a hint.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
-use std::path::{Path, PathBuf};
+use std::fs::File;
+use std::io::Read as _;
+use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use crate::bag::adapters::known_span;
-use crate::bag::deferred::open_each;
 use crate::bag::folder::{Recording, is_spare, is_storage, only_recording, recordings};
-use crate::bag::input::{BagPlace, FormatRow, Input, file_name, size_on_disk};
+use crate::bag::input::{BagPlace, FormatRow, Input, explain, file_name, size_on_disk};
 use crate::bag::model::{
-    Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink, Want, damaged,
+    Connection, ConnectionId, Encoding, Growing, Growth, Message, OpenOptions, Reader, Report,
+    Sink, Want, damaged,
 };
-use crate::bag::unknown::explain;
-use crate::base::budget::FILES;
+use crate::bag::{self, open_each};
+use crate::base::budget::{FILES, YAML};
 use crate::base::error::{Error, Result};
+use crate::base::file::with_suffix;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::OUT_OF_ORDER_NS;
 use crate::base::time::{Span, Stamp};
-use metadata::Metadata;
+use crate::base::yaml::{self, Value};
 
 /// The format of rosbag2 folders.
 pub(crate) const FORMAT: FormatRow = FormatRow {
@@ -31,7 +31,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     is_inside: |_| false,
     sniff: |place, _| matches!(place, BagPlace::Folder(_)),
     open,
-    follow: Some(|path| Ok(Box::new(growing::GrowingFolder::new(path)))),
+    follow: Some(|path| Ok(Box::new(GrowingFolder::new(path)))),
 };
 
 /// A folder's storage files.
@@ -75,7 +75,7 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
         metadata: Metadata::default(),
         notices: Vec::new(),
     };
-    match metadata::read(&path) {
+    match read_metadata(&path) {
         Ok(found) => folder.metadata = found.unwrap_or_default(),
         Err(why) => {
             let text = format!("`metadata.yaml` was left out: {why}");
@@ -133,7 +133,7 @@ fn storage_and_links(folder: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
     };
     let files = entries.filter_map(|e| Some(e.ok()?.path()));
     let files = files.filter(|p| is_storage(p) && p.is_file() && !is_spare(p));
-    files.partition(|file| metadata::is_inside(folder, file))
+    files.partition(|file| is_inside(folder, file))
 }
 
 impl BagFolder {
@@ -147,7 +147,7 @@ impl BagFolder {
         let (mut found, mut known) = (Vec::new(), HashSet::new());
         let mut missing = Vec::new();
         for name in named.iter().take(FILES) {
-            match metadata::locate(path, name) {
+            match locate(path, name) {
                 Ok(file) if known.insert(file.clone()) => found.push(file),
                 Ok(_) => {}
                 Err(why) => missing.push(why),
@@ -230,7 +230,7 @@ impl BagFolder {
         if reasons.is_empty() {
             let (_, links) = storage_and_links(path);
             let names = links.iter().filter_map(|link| link.file_name());
-            reasons.extend(names.map(|name| metadata::leads_out(&name.to_string_lossy())));
+            reasons.extend(names.map(|name| leads_out(&name.to_string_lossy())));
         }
         if reasons.is_empty() {
             return explain(path, &[], true);
@@ -420,4 +420,218 @@ impl Sink for PartsAdapter<'_> {
         self.sink
             .progress(*before + done, (*whole).max(*before + total));
     }
+}
+
+// A rosbag2 folder that is still being written: its storage files, including those added by splits.
+
+/// The number of polls without growth after which a recording with metadata is over: two seconds, in which a recorder
+/// closes its last file.
+const QUIET: u32 = 8;
+
+/// A folder's storage files, each with its read position.
+#[derive(Default)]
+struct GrowingFolder {
+    path: PathBuf,
+    parts: Vec<Part>,
+    /// The files found so far, including those that cannot be followed.
+    seen: BTreeSet<PathBuf>,
+    joined: Joined,
+    quiet: u32,
+}
+
+/// A storage file.
+struct Part {
+    file: Box<dyn Growing>,
+    connections: PartConnections,
+    is_over: bool,
+}
+
+impl Growing for GrowingFolder {
+    fn poll(&mut self, sink: &mut dyn Sink) -> Result<Growth> {
+        self.find();
+        let none = Metadata::default();
+        let mut grew = false;
+        for part in self.parts.iter_mut().filter(|part| !part.is_over) {
+            let mut adapter = PartsAdapter::new(&none, sink, 0);
+            adapter.joined = std::mem::take(&mut self.joined);
+            adapter.part = std::mem::take(&mut part.connections);
+            let growth = part.file.poll(&mut adapter);
+            (self.joined, part.connections) = (adapter.joined, adapter.part);
+            grew |= matches!(growth, Ok(Growth::More));
+            // A file that disappeared was full and has been compressed; its content was read before.
+            part.is_over = matches!(growth, Ok(Growth::Ended) | Err(_));
+        }
+        self.quiet = if grew { 0 } else { self.quiet + 1 };
+        Ok(if grew {
+            Growth::More
+        } else if self.quiet >= QUIET && self.is_closed() {
+            Growth::Ended
+        } else {
+            Growth::Same
+        })
+    }
+
+    fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl GrowingFolder {
+    fn new(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            ..Self::default()
+        }
+    }
+
+    /// Finds new storage files. One that cannot be followed yet is retried.
+    fn find(&mut self) {
+        for file in storage(&self.path) {
+            if self.seen.contains(&file) || self.seen.len() >= FILES {
+                continue;
+            }
+            if let Ok(growing) = bag::follow(&Input::Path(file.clone())) {
+                self.seen.insert(file);
+                self.parts.push(Part {
+                    file: growing,
+                    connections: PartConnections::default(),
+                    is_over: false,
+                });
+            }
+        }
+    }
+
+    /// Whether the metadata, which is written at the end, lists all files.
+    fn is_closed(&self) -> bool {
+        let named = read_metadata(&self.path).ok().flatten();
+        named.is_some_and(|named| named.files.len() >= storage(&self.path).len())
+    }
+}
+
+// `metadata.yaml` of a rosbag2 folder, versions 1 to 9, as a hint: storage files and quality of service.
+
+/// The contents of `metadata.yaml`.
+#[derive(Default)]
+struct Metadata {
+    /// Names of storage files, as written.
+    files: Vec<String>,
+    topics: BTreeMap<String, TopicMetadata>,
+    facts: Vec<(String, String)>,
+}
+
+/// A topic in `metadata.yaml`.
+struct TopicMetadata {
+    type_name: Arc<str>,
+    encoding: String,
+    qos: Option<Arc<str>>,
+    hash: Option<Arc<str>>,
+}
+
+/// Reads `metadata.yaml` in `folder`: `Ok(None)` if there is none, the reason if it cannot be parsed.
+fn read_metadata(folder: &Path) -> Result<Option<Metadata>, String> {
+    let path = folder.join("metadata.yaml");
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let mut bytes = Vec::new();
+    let file = File::open(&path).map_err(|e| e.to_string())?;
+    let read_metadata = file.take(YAML as u64).read_to_end(&mut bytes);
+    read_metadata.map_err(|e| e.to_string())?;
+    let data = yaml::parse(&String::from_utf8_lossy(&bytes))
+        .map_err(|e| format!("line {}: {}", e.at.line, e.reason))?;
+    let root = data.get("rosbag2_bagfile_information");
+    let root = root.ok_or("it has no `rosbag2_bagfile_information`")?;
+    Ok(Some(understand(root)))
+}
+
+fn understand(root: &Value) -> Metadata {
+    let mut metadata = Metadata::default();
+    let files = root.get("relative_file_paths").and_then(Value::as_array);
+    let names = files.into_iter().flatten().filter_map(Value::as_str);
+    metadata.files = names.map(str::to_owned).collect();
+    let own = ["storage_identifier", "ros_distro", "compression_mode"].map(|key| (key, key));
+    for (key, name) in [("version", "metadata_version")].into_iter().chain(own) {
+        let text = match root.get(key) {
+            Some(Value::String(text)) if !text.is_empty() => text.clone(),
+            Some(Value::Number(number)) => number.to_string(),
+            _ => continue,
+        };
+        metadata.facts.push((name.to_owned(), text));
+    }
+    let topics = root
+        .get("topics_with_message_count")
+        .and_then(Value::as_array);
+    for topic in topics.into_iter().flatten() {
+        let Some(topic) = topic.get("topic_metadata") else {
+            continue;
+        };
+        let text = |key| topic.get(key).and_then(Value::as_str).unwrap_or_default();
+        if !text("name").is_empty() {
+            metadata
+                .topics
+                .insert(text("name").to_owned(), of_topic(topic, text));
+        }
+    }
+    metadata
+}
+
+fn of_topic<'v>(topic: &'v Value, text: impl Fn(&'static str) -> &'v str) -> TopicMetadata {
+    let some = |text: &str| (!text.is_empty()).then(|| Arc::from(text));
+    TopicMetadata {
+        type_name: text("type").into(),
+        encoding: text("serialization_format").to_owned(),
+        qos: match topic.get("offered_qos_profiles") {
+            // Up to version 8 the profiles are text, from version 9 on data.
+            Some(Value::Array(all)) if !all.is_empty() => {
+                some(&Value::from(all.clone()).to_string())
+            }
+            Some(Value::String(profiles)) => some(profiles),
+            _ => None,
+        },
+        hash: some(text("type_description_hash")),
+    }
+}
+
+/// The file in `folder` with this `name`, which must be a plain name of a regular file. Up to version 3 it is prefixed
+/// by the folder's own name.
+///
+/// # Errors
+/// A sentence with the reason why not.
+fn locate(folder: &Path, name: &str) -> Result<PathBuf, String> {
+    let path = Path::new(name);
+    if path
+        .components()
+        .any(|c| !matches!(c, Component::Normal(_) | Component::CurDir))
+    {
+        return Err(format!("`{name}` leaves the folder and was not followed"));
+    }
+    let Some(last) = path.file_name() else {
+        return Err(format!("`{name}` is not a file name"));
+    };
+    let plain = folder.join(last);
+    let found = [
+        plain.clone(),
+        with_suffix(&plain, ".zstd"),
+        plain.with_extension(""),
+    ];
+    let is_storage = |p: &&PathBuf| p.is_file() && is_storage(p) && !is_spare(p);
+    let Some(found) = found.iter().find(is_storage) else {
+        return Err(format!("`{}` is missing", last.to_string_lossy()));
+    };
+    if is_inside(folder, found) {
+        Ok(found.clone())
+    } else {
+        Err(leads_out(name))
+    }
+}
+
+/// Whether a file lies in a folder after links are resolved.
+fn is_inside(folder: &Path, file: &Path) -> bool {
+    let real = file.canonicalize().ok().zip(folder.canonicalize().ok());
+    real.is_some_and(|(file, folder)| file.starts_with(folder))
+}
+
+/// The notice about a link that leads out of the folder.
+fn leads_out(name: &str) -> String {
+    format!("`{name}` is a link out of the folder and was not followed")
 }

@@ -5,9 +5,10 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::bag::checksum::Checksum;
+use crc32fast::Hasher;
+
 use crate::base::error::{Error, Result};
-use crate::base::leftovers::Leftover;
+use crate::base::file::Leftover;
 
 /// A file with random access, shared by several threads. It counts the bytes it reads.
 #[derive(Debug)]
@@ -144,7 +145,7 @@ pub(crate) struct ByteStream<'a> {
     /// The number of bytes read at a time.
     step: usize,
     /// The CRC-32 of all bytes taken except `buffer[summed..used]`, if requested.
-    sum: Option<Checksum>,
+    sum: Option<Hasher>,
     summed: usize,
 }
 
@@ -185,20 +186,20 @@ impl<'a> ByteStream<'a> {
 
     /// Starts a checksum of all bytes taken from here on; skipped bytes of a file are then read too.
     pub(crate) fn sum_up(&mut self) {
-        self.sum = Some(Checksum::default());
+        self.sum = Some(Hasher::new());
         self.summed = self.used;
     }
 
     /// The CRC-32 of all bytes taken since [`ByteStream::sum_up`]; `None` without that.
     pub(crate) fn sum(&mut self) -> Option<u32> {
         self.update_sum();
-        self.sum.as_ref().map(Checksum::crc)
+        self.sum.clone().map(Hasher::finalize)
     }
 
     /// Adds the bytes taken since the last call, many at once.
     fn update_sum(&mut self) {
         if let Some(sum) = &mut self.sum {
-            sum.add(&self.buffer[self.summed..self.used]);
+            sum.update(&self.buffer[self.summed..self.used]);
             self.summed = self.used;
         }
     }
@@ -329,6 +330,13 @@ impl Read for ByteStream<'_> {
     }
 }
 
+/// The CRC-32 of bytes of which `crc` is that of those before `more`.
+pub(crate) fn extended(crc: u32, more: &[u8]) -> u32 {
+    let mut sum = Hasher::new_with_initial(crc);
+    sum.update(more);
+    sum.finalize()
+}
+
 fn read_some(reader: &mut dyn Read, into: &mut [u8]) -> io::Result<usize> {
     loop {
         match reader.read(into) {
@@ -374,11 +382,7 @@ mod tests {
             assert_eq!(stream.peek(300).unwrap(), &bytes[5003..5303]);
             assert_eq!(stream.skip(u64::MAX).unwrap(), 4997);
             assert!(stream.peek(1).unwrap().is_empty());
-            let sum = (at > 0).then(|| {
-                let mut sum = Checksum::default();
-                sum.add(&bytes);
-                sum.crc()
-            });
+            let sum = (at > 0).then(|| extended(0, &bytes));
             assert_eq!(stream.sum(), sum);
         }
     }

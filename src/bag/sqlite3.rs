@@ -3,29 +3,29 @@
 //! The tables: `sqlite_storage.cpp` of `rosbag2_storage_sqlite3`.
 
 mod db;
-mod growing;
-mod ready;
 mod rows;
 
 use std::collections::{BTreeMap, HashMap};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::SystemTime;
+
+use db::{Db, Ready, Refusal};
+use rows::{RowRange, RowReader, ZSTD};
 
 use crate::bag::adapters::{Clip, in_order, share};
 use crate::bag::input::{BagPlace, FormatRow, file_name};
 use crate::bag::model::{
-    Connection, ConnectionId, Encoding, MOST_PAYLOAD, OpenOptions, Reader, Report, Sink, Tier,
-    Want, damaged,
+    Connection, ConnectionId, Encoding, Growing, Growth, MOST_PAYLOAD, OpenOptions, Reader, Report,
+    Sink, Tier, Want, damaged,
 };
 use crate::bag::source::FileSource;
 use crate::base::budget::CONNECTIONS;
 use crate::base::error::{Error, Result};
+use crate::base::file::with_suffix;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
-use db::{Db, Refusal};
-use ready::Ready;
-use rows::{RowRange, RowReader, ZSTD};
 
 /// ROS 2 bags in SQLite.
 pub(crate) const FORMAT: FormatRow = FormatRow {
@@ -36,7 +36,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     is_inside: |_| false,
     sniff: |_, head| head.starts_with(b"SQLite format 3\0"),
     open,
-    follow: Some(|path| Ok(Box::new(growing::GrowingDb::new(path)))),
+    follow: Some(|path| Ok(Box::new(GrowingDb::new(path)))),
 };
 
 /// A database with its topics.
@@ -63,7 +63,7 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
             return Err(Error::unsupported(name, what, "save it to a file first"));
         }
     };
-    let ready = ready::ready(source.path())?;
+    let ready = db::ready(source.path())?;
     bag(ready, &source, options).map(|bag| Box::new(bag) as Box<dyn Reader>)
 }
 
@@ -376,5 +376,80 @@ impl Reader for Sqlite3Bag {
             file_bytes: self.file_bytes,
             facts: self.facts.clone(),
         })
+    }
+}
+
+// A database that is still being written: its new rows, read without a lock.
+//
+// rosbag2 writes with `journal_mode=MEMORY` and aborts if the database is locked, so SQLite opens it as immutable and
+// takes no lock; a half-written page ends a poll, and the next one continues there. With a log beside it (`-wal`) a
+// reader never blocks the writer, and a short transaction reads both.
+
+/// The number of polls between two openings of the database: polling is cheap, starting SQLite is not.
+const EVERY: u32 = 4;
+
+/// A database, read up to the last reported row.
+#[derive(Default)]
+struct GrowingDb {
+    path: PathBuf,
+    /// The sizes and times of change of the database and its log when it was last read.
+    seen: Vec<(u64, Option<SystemTime>)>,
+    /// The polls since then.
+    looks: u32,
+    /// The first row that has not been reported.
+    next: i64,
+    wants: Vec<Want>,
+}
+
+impl GrowingDb {
+    fn new(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            looks: EVERY,
+            next: i64::MIN,
+            ..Self::default()
+        }
+    }
+}
+
+impl Growing for GrowingDb {
+    fn poll(&mut self, sink: &mut dyn Sink) -> Result<Growth> {
+        self.looks += 1;
+        let source = FileSource::open(&self.path)?;
+        let wal = with_suffix(&self.path, "-wal");
+        let state = |path: &Path| {
+            let meta = path.metadata().ok()?;
+            Some((meta.len(), meta.modified().ok()))
+        };
+        let now: Vec<_> = [&self.path, &wal]
+            .into_iter()
+            .filter_map(|p| state(p))
+            .collect();
+        if now == self.seen || self.looks < EVERY {
+            return Ok(Growth::Same);
+        }
+        (self.seen, self.looks) = (now, 0);
+        let has_log = wal.metadata().is_ok_and(|log| log.len() > 0);
+        let ready = Ready::growing(&self.path, has_log);
+        // The table may not exist yet.
+        let Ok(bag) = bag(ready, &source, &OpenOptions::default()) else {
+            return Ok(Growth::Same);
+        };
+        for topic in bag.topics.iter().skip(self.wants.len()) {
+            self.wants.push(sink.connection(topic));
+        }
+        let before = self.next;
+        if let Ok(db) = Db::open(&bag.ready) {
+            self.next = RowReader::new(&bag, &self.wants, None).read_from(&db, self.next, sink);
+        }
+        Ok(if self.next > before {
+            Growth::More
+        } else {
+            Growth::Same
+        })
+    }
+
+    fn path(&self) -> &Path {
+        &self.path
     }
 }

@@ -22,13 +22,6 @@ pub(crate) struct Seam {
     counts: ById<ConnectionId, u64>,
 }
 
-impl Seam {
-    /// The number of a connection's messages before it.
-    fn count_before(&self, connection: ConnectionId) -> u64 {
-        self.counts.get(connection).copied().unwrap_or(0)
-    }
-}
-
 /// The state of a connection.
 #[derive(Clone, Debug, Default)]
 struct Line {
@@ -244,7 +237,11 @@ impl<'a> Straightened<'a> {
         let next = &mut self.counts.grown(connection)[kind];
         let count = *next;
         *next += 1;
-        let behind = |seam: &Seam| seam.count_before(connection) <= count;
+        let behind = |seam: &Seam| {
+            seam.counts
+                .get(connection)
+                .is_none_or(|before| *before <= count)
+        };
         time.plus(self.shifts[self.seams.partition_point(behind)])
     }
 }

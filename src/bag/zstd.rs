@@ -7,10 +7,9 @@ use std::sync::Arc;
 
 use crate::bag::FORMATS;
 use crate::bag::decompress::{Allowance, Compression};
-use crate::bag::input::{BagPlace, FormatRow, HEAD, file_name};
+use crate::bag::input::{BagPlace, FormatRow, HEAD, explain, file_name};
 use crate::bag::model::{OpenOptions, Reader, Report, Sink};
 use crate::bag::source::{ByteStream, FileSource, Temporary};
-use crate::bag::unknown::explain;
 use crate::base::budget::{UNPACKED_COPY, UNPACKED_FOLD};
 use crate::base::error::{Error, Result};
 use crate::base::time::Span;

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use crate::base::leftovers;
+use crate::base::file;
 
 /// The time that the work may take to stop by itself: people notice half a second. Its temporary files are removed.
 const GRACE: Duration = Duration::from_millis(250);
@@ -70,7 +70,7 @@ impl Stop {
 
 /// Ends the process without leaving partial files: those are unnamed, or registered and removed.
 fn end(signal: u8, report: fn()) {
-    leftovers::remove();
+    file::remove_leftovers();
     let message = thread::spawn(report);
     let mut waited = Duration::ZERO;
     while !message.is_finished() && waited < REPORT_LIMIT {

@@ -6,10 +6,9 @@ use std::io;
 
 use crate::base::budget;
 use crate::base::ids::{ById, grouped};
-use crate::base::name::NodeName;
+use crate::base::name::{NodeName, start};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::GAP_NS;
-use crate::base::role::start;
 use crate::base::time::{DAY, Span, Stamp};
 use crate::evidence::inference::Stream;
 use crate::evidence::observation::Observations;

@@ -315,7 +315,7 @@ impl Collector {
 /// latched too, but their last record is not evidence of the time at which the node ended.
 fn is_held(connection: &Connection) -> bool {
     let qos = connection.qos.as_deref().unwrap_or_default();
-    let kept = connection.latching || source::qos::is_transient_local(qos);
+    let kept = connection.latching || source::connection::is_transient_local(qos);
     kept && !is_log(connection.topic.as_str())
 }
 

@@ -8,7 +8,6 @@ mod dot;
 pub(crate) mod launch;
 #[cfg(feature = "source")]
 mod python;
-pub(crate) mod substitution;
 mod tree;
 mod yaml;
 

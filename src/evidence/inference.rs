@@ -9,7 +9,7 @@ use crate::base::ids::{ById, Few};
 use crate::base::name::{is_log, plain_type};
 use crate::base::rhythm::CLOSE_NS;
 use crate::base::time::{Span, Stamp};
-use crate::evidence::message::log::is_ros1_log;
+use crate::evidence::message::dynamic::is_ros1_log;
 use crate::evidence::observation::{
     Confidence, EvidenceLine, LoggedText, Name, Observation, ObservationRecord, Observations,
     SourceId,

@@ -5,4 +5,3 @@ pub(crate) mod cursor;
 pub(crate) mod definition;
 pub(crate) mod dynamic;
 pub(crate) mod fields;
-pub(crate) mod log;

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use crate::base::budget;
 use crate::base::ids::{ById, ids};
-use crate::base::role::is_named;
+use crate::base::name::is_named;
 use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
 use crate::evidence::source_word;

@@ -6,20 +6,15 @@ pub(crate) mod connection;
 pub(crate) mod contract;
 pub(crate) mod conventions;
 pub(crate) mod diagnostics;
-pub(crate) mod discovery;
 pub(crate) mod echo;
 pub(crate) mod equal_stamps;
-pub(crate) mod lifecycle;
+pub(crate) mod events;
 pub(crate) mod log_text;
-pub(crate) mod parameters;
 pub(crate) mod payload;
-pub(crate) mod qos;
 pub(crate) mod recorder;
 pub(crate) mod rosgraph;
 pub(crate) mod rosout;
-pub(crate) mod service_event;
 pub(crate) mod sim_time;
-pub(crate) mod sister;
 pub(crate) mod statistics;
 
 use crate::base::name::{in_space, plain_type};
@@ -27,13 +22,13 @@ use crate::base::time::{Span, Stamp};
 use crate::evidence::SOURCES;
 use crate::evidence::inference::{Conclusions, Stream};
 use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
-use crate::evidence::message::dynamic::MessageSchema;
-use crate::evidence::message::dynamic::{LayoutFit, MessageLayout};
-use crate::evidence::message::log::{LogRecord, is_ros1_log};
+use crate::evidence::message::dynamic::{
+    LayoutFit, LogRecord, MessageLayout, MessageSchema, is_ros1_log,
+};
 use crate::evidence::observation::{
     Confidence, Measurement, Name, Observation, Observations, SourceId, Statement,
 };
-use crate::evidence::source::parameters::ParameterEvent;
+use crate::evidence::source::events::ParameterEvent;
 
 /// A kind of evidence.
 pub struct Source {

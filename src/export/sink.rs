@@ -8,7 +8,7 @@ use tempfile::NamedTempFile;
 
 use super::target::{Target, folder_of, is_special};
 use crate::base::error::{Error, Result};
-use crate::base::leftovers::Leftover;
+use crate::base::file::Leftover;
 
 /// A file (or standard output) in progress. Dropped without [`OutputSink::commit`], a file is removed.
 #[derive(Debug)]

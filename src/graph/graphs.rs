@@ -97,17 +97,13 @@ impl Graphs {
 
     /// The lifecycle state in a row.
     pub(crate) fn lifecycle(&self, row: &Row) -> Option<&Arc<str>> {
-        self.lifecycle_of(row.lifecycle)
+        self.lifecycles
+            .get((row.lifecycle as usize).checked_sub(1)?)
     }
 
     /// A walk through all windows that yields only differences from the previous one.
     pub(crate) fn walk(&self) -> ColumnWalk<'_> {
         ColumnWalk::new(&self.columns.0)
-    }
-
-    /// The lifecycle state of this number, counted from 1.
-    pub(crate) fn lifecycle_of(&self, place: u32) -> Option<&Arc<str>> {
-        self.lifecycles.get((place as usize).checked_sub(1)?)
     }
 }
 

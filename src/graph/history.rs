@@ -3,13 +3,12 @@
 //!
 //! In: everything recorded, and the findings. Out: a [`History`], made once, from which windows, events, phases and figures
 //! are derived; nothing here depends on windows. Begin with `records`, which calls the others in order: `senders` reads the
-//! times of every topic, `restarts`, `pauses` and `simulation` find restarts and the pauses of `recordings` and simulators in them, `liveness` collects the signs
-//! of each element, `lifetimes` decides when it existed.
+//! times of every topic and recording, `restarts`, `pauses` and `simulation` find restarts and the pauses of recorders and simulators
+//! in them, `liveness` collects the signs of each element, `lifetimes` decides when it existed.
 
 mod lifetimes;
 mod liveness;
 mod pauses;
-mod recordings;
 pub(crate) mod records;
 mod restarts;
 pub(crate) mod senders;
@@ -30,10 +29,9 @@ use crate::base::rhythm::{
 };
 use crate::base::time::{Span, Stamp};
 
-pub(crate) use recordings::parts;
 pub(crate) use records::{History, Record, made};
 pub(crate) use restarts::unread;
-pub(crate) use senders::traffic;
+pub(crate) use senders::{parts, traffic};
 
 /// A moment with its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

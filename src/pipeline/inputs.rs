@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::Reading;
-use crate::bag::moved::Moved;
-use crate::bag::{self, Connection, ConnectionId, Input, OpenOptions, Reader, Sink, Want};
+use crate::bag::{self, Connection, ConnectionId, Input, Moved, OpenOptions, Reader, Sink, Want};
 use crate::base::error::{Error, Result};
 use crate::base::ids::grouped;
 use crate::base::notice::{Notice, NoticeKind};

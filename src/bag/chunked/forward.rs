@@ -1,21 +1,23 @@
-//! A chunked bag record by record from the front: without an index, cut, still open, or from a pipe.
+//! A chunked bag record by record from the front: without an index, cut, from a pipe, or while it is still being written.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::Grammar;
-use super::check::{Behind, ChunkMessages};
 use super::index::{OTHER_TIMES, absent, hand_over, nameless, spans};
-use super::plan::MOST_CHUNKS;
 use super::record::{
-    Announced, ChunkHead, Counts, MessageHead, NoRecord, RecordHead, pass, peek_whole, walk,
+    Announced, ChunkHead, Counts, MessageHead, NoRecord, RecordKind, pass, peek_whole, walk,
 };
-use super::search::{Before, next_chunk, next_record};
-use super::unpack::{Visitor, records, unpack};
+use crate::bag::adapters::Gather;
+use crate::bag::chunked::record::{Before, Visitor, next_chunk, next_record, records, unpack};
+use crate::bag::chunked::{HEAD, MOST_CHUNKS};
 use crate::bag::decompress::{Allowance, Compression};
-use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Sink, damaged};
-use crate::bag::source::ByteStream;
+use crate::bag::input::closed;
+use crate::bag::model::{ConnectionId, Growing, Growth, MOST_PAYLOAD, Sink, damaged};
+use crate::bag::source::{ByteStream, FAR, FileSource};
+use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
 
@@ -147,18 +149,18 @@ impl<G: Grammar> Walk<G> {
         let mut at = stream.position();
         let stop = walk(stream, u64::MAX, |stream| {
             let from = stream.position();
-            let step = G::next(stream).and_then(|record| match record {
-                RecordHead::Chunk(head) if is_growing && head.unclosed => {
+            let step = G::next(stream).and_then(|record| match record.kind {
+                RecordKind::Chunk(head) if is_growing && head.unclosed => {
                     let body = stream.position();
                     let is_followed = next_chunk::<G>(stream, from);
                     stream.back(body);
                     let chunk = is_followed.then(|| forward.chunk(stream, from, &head));
                     chunk.unwrap_or(Err(NoRecord::Cut))
                 }
-                record if is_growing && stream.left().is_some_and(|left| left < record.len()) => {
+                _ if is_growing && stream.left().is_some_and(|left| left < record.len) => {
                     Err(NoRecord::Cut)
                 }
-                record => forward.record(stream, from, record),
+                kind => forward.record(stream, from, kind, record.len),
             });
             at = if is_growing { at } else { stream.position() };
             let is_found = match step {
@@ -227,38 +229,39 @@ impl<G: Grammar> Forward<'_, G> {
         &mut self,
         stream: &mut ByteStream<'_>,
         from: u64,
-        record: RecordHead<G::Description>,
+        kind: RecordKind<G::Description>,
+        len: u64,
     ) -> Result<(), NoRecord> {
         self.walk.records += 1;
-        let is_content = matches!(record, RecordHead::Chunk(_) | RecordHead::Message(_));
+        let is_content = matches!(kind, RecordKind::Chunk(_) | RecordKind::Message(_));
         if self.walk.ended && is_content {
             self.walk.ended = false;
             self.damage("messages follow the end of the data");
         }
-        if record.is_of_the_end() && G::HAS_END && !self.walk.ended {
+        if kind.is_of_the_end() && G::HAS_END && !self.walk.ended {
             self.damage("records that belong to the bag's end are among its messages");
         }
-        match record {
-            RecordHead::Chunk(head) => self.chunk(stream, from, &head),
-            RecordHead::Message(head) => {
+        match kind {
+            RecordKind::Chunk(head) => self.chunk(stream, from, &head),
+            RecordKind::Message(head) => {
                 if self.walk.is_chunked && !G::IS_LOOSE {
                     self.damage("messages are outside of chunks");
                 }
                 self.walk.compression.insert(Compression::None);
                 self.message(stream, head)
             }
-            RecordHead::Description { what, len } => self.description(stream, &what, len),
-            RecordHead::Index { raw, count, len } => self.index(stream, (raw, count), len),
-            RecordHead::Total { stated, len } => {
+            RecordKind::Description(what) => self.description(stream, &what, len),
+            RecordKind::Index { raw, count } => self.index(stream, (raw, count), len),
+            RecordKind::Total(stated) => {
                 self.walk.account.stated = stated;
                 pass(stream, len)
             }
-            RecordHead::Listed { at, times, len } => {
+            RecordKind::Listed { at, times } => {
                 self.report_chunk();
                 self.walk.account.list(at, times);
                 pass(stream, len)
             }
-            RecordHead::DataEnd { len, crc } => {
+            RecordKind::DataEnd(crc) => {
                 self.walk.ended = true;
                 if is_other(stream, crc) {
                     self.damage("the checksum of its data is wrong");
@@ -269,8 +272,8 @@ impl<G: Grammar> Forward<'_, G> {
                 }
                 Ok(())
             }
-            RecordHead::FileEnd { len, crc } => self.file_end(stream, len, crc),
-            RecordHead::Unknown { len, extension } => {
+            RecordKind::FileEnd(crc) => self.file_end(stream, len, crc),
+            RecordKind::Unknown { extension } => {
                 self.walk.found_messages.interrupt();
                 let text = "records of a kind that the format does not define were skipped";
                 if extension {
@@ -280,7 +283,7 @@ impl<G: Grammar> Forward<'_, G> {
                 }
                 pass(stream, len)
             }
-            RecordHead::Other { len } | RecordHead::Tail { len } => {
+            RecordKind::Other | RecordKind::Tail => {
                 self.walk.found_messages.interrupt();
                 pass(stream, len)
             }
@@ -516,5 +519,205 @@ impl Early {
         run.stamps.push(time);
         run.sizes.push(size);
         run.last += 1;
+    }
+}
+
+// The messages found in a chunk, kept until the index that follows it has been read.
+
+/// An index record after a chunk.
+pub(super) struct Behind {
+    pub(super) id: ConnectionId,
+    pub(super) count: u32,
+    /// The times of the messages; none if there are too many.
+    pub(super) stamps: Vec<Stamp>,
+}
+
+/// The messages found since the last chunk began.
+#[derive(Default)]
+struct ChunkMessages {
+    gather: Gather,
+    /// The number of messages of the bag that have been or will be reported.
+    messages: u64,
+    /// Whether the chunk is damaged, so that its index is used instead.
+    doubtful: bool,
+    /// Whether another record followed the chunk: it may have been a chunk, and the index records after it may be its
+    /// own.
+    interrupted: bool,
+    /// Index records that contradict the chunk.
+    behind: Vec<Behind>,
+    /// Whether one has the same messages at other times.
+    misdated: bool,
+    /// The number of messages in the index but not in the chunk; `surplus` is the converse.
+    missing: u64,
+    surplus: u64,
+}
+
+impl ChunkMessages {
+    /// Adds one message.
+    fn add(&mut self, id: ConnectionId, time: Stamp, size: u32, sink: &mut dyn Sink) {
+        self.messages += 1;
+        self.gather.add(id, time, size, sink);
+    }
+
+    /// Marks the chunk as damaged and keeps only plausible messages: times inside `times`, none twice.
+    fn doubt(&mut self, times: Option<(Stamp, Stamp)>) {
+        self.doubtful = true;
+        if let Some((first, last)) = times {
+            self.messages -= self.gather.retain(|at| first <= at && at <= last);
+        }
+    }
+
+    /// Records that another record than its index followed the chunk.
+    fn interrupt(&mut self) {
+        self.interrupted = true;
+    }
+
+    /// Passes on what was found so far, unless the index may be needed instead.
+    fn spill(&mut self, sink: &mut dyn Sink) {
+        if !self.doubtful {
+            self.gather.spill(sink);
+        }
+    }
+
+    /// Whether an index record belongs to a chunk that was not seen, not to the last one.
+    fn is_of_another(&self, id: ConnectionId, stamps: &[Stamp]) -> bool {
+        self.interrupted && !self.gather.holds(id, stamps)
+    }
+
+    /// Adds an index record.
+    fn behind(&mut self, record: Behind) {
+        let (found, count) = (self.gather.count(record.id), u64::from(record.count));
+        self.missing += count.saturating_sub(found);
+        self.surplus += found.saturating_sub(count);
+        let is_whole = record.stamps.len() as u64 == count;
+        let is_needed = self.interrupted || self.doubtful && found != count || found < count;
+        if !is_needed && is_whole && found == count {
+            self.misdated |= !self.gather.holds(record.id, &record.stamps);
+        } else if is_needed && is_whole {
+            self.behind.push(record);
+        }
+    }
+
+    /// Whether the index states other times than the messages of the chunk have.
+    fn is_misdated(&mut self) -> bool {
+        std::mem::take(&mut self.misdated)
+    }
+
+    /// Reports all messages to `sink`; returns how many were only in the index, and how many only in the chunk. If the
+    /// two disagree, the index is used if the chunk is damaged or lacks more messages than it has in excess.
+    fn report_all(&mut self, sink: &mut dyn Sink) -> (u64, u64) {
+        let believed = self.doubtful || self.missing > self.surplus;
+        let mut witnessed = 0;
+        for record in self.behind.drain(..).filter(|_| believed) {
+            // Messages that were already passed on cannot be taken back.
+            let Some(found) = self.gather.take(record.id) else {
+                continue;
+            };
+            let known = record.stamps.len() as u64;
+            witnessed += known.saturating_sub(found);
+            self.messages = self.messages - found + known;
+            if known > 0 {
+                sink.stamps(record.id, &record.stamps, None);
+            }
+        }
+        self.gather.flush(sink);
+        let surplus = std::mem::take(&mut self.surplus);
+        self.missing = 0;
+        (self.doubtful, self.interrupted) = (false, false);
+        (witnessed, surplus)
+    }
+}
+
+// A chunked bag that is still being written: each record once, as soon as it is complete.
+
+/// The position up to which a growing bag has been read, and the state of the walk there.
+struct GrowingChunks<G> {
+    path: PathBuf,
+    /// The first byte that has not been reported.
+    at: u64,
+    /// The size of the bag when it was last read.
+    len: u64,
+    /// Whether the bag had its end at that time.
+    is_closed: bool,
+    walk: Walk<G>,
+    /// The last bytes before `at` that a recorder never changes.
+    behind: Vec<u8>,
+}
+
+/// The number of bytes by which it is noticed that a bag was replaced.
+const BEHIND: u64 = 64;
+
+/// Follows a bag of this grammar.
+pub(crate) fn follow<G: Grammar>(path: &Path) -> Result<Box<dyn Growing>> {
+    let source = FileSource::open(path)?;
+    let mut head = [0; HEAD];
+    let got = source.read_at(0, &mut head);
+    G::accept(path, &head[..got.map_err(Error::io("read", path))?])?;
+    Ok(Box::new(GrowingChunks::<G> {
+        path: path.to_owned(),
+        at: 0,
+        len: 0,
+        is_closed: false,
+        walk: Walk::default(),
+        behind: Vec::new(),
+    }))
+}
+
+impl<G: Grammar> Growing for GrowingChunks<G> {
+    fn poll(&mut self, sink: &mut dyn Sink) -> Result<Growth> {
+        if let Some(closed) = closed(&self.path) {
+            self.path = closed;
+        }
+        let source = FileSource::open(&self.path)?;
+        let len = source.len();
+        let fail = || Error::io("read", &self.path);
+        let behind = self.last_bytes(&source).map_err(fail())?;
+        if len < self.len || behind != self.behind {
+            let text = if len < self.len {
+                format!("the bag was shortened to {len} bytes while it was followed")
+            } else {
+                "the bag was rewritten while it was followed".to_owned()
+            };
+            sink.notice(Notice::new(NoticeKind::Truncated, text));
+            return Ok(Growth::Ended);
+        }
+        if len == self.len {
+            return Ok(if self.is_closed {
+                Growth::Ended
+            } else {
+                Growth::Same
+            });
+        }
+        let plan = G::plan(&source).map_err(fail())?;
+        self.is_closed = plan.is_ok() || G::is_ended(&source);
+        self.len = len;
+        let mut stream = ByteStream::of_file(&source, self.at, len, FAR);
+        if self.at == 0 {
+            G::begin(&mut stream);
+        }
+        let (stop, at) = self.walk.go(&mut stream, 0, !self.is_closed, sink);
+        self.at = at;
+        if self.is_closed {
+            std::mem::take(&mut self.walk).finish(&stop, at, sink);
+        }
+        self.behind = self
+            .last_bytes(&source)
+            .map_err(Error::io("read", &self.path))?;
+        Ok(Growth::More)
+    }
+
+    fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl<G: Grammar> GrowingChunks<G> {
+    /// The bytes before byte `at`, as far as the head of a chunk.
+    fn last_bytes(&self, source: &FileSource) -> std::io::Result<Vec<u8>> {
+        let len = self.at.saturating_sub(self.walk.body).min(BEHIND);
+        let mut bytes = vec![0; usize::try_from(len).unwrap_or(0)];
+        let got = source.read_at(self.at - len, &mut bytes)?;
+        bytes.truncate(got);
+        Ok(bytes)
     }
 }

@@ -9,11 +9,12 @@ use mcap::MAGIC;
 use mcap::records::op;
 
 use super::{Described, Mcap};
-use crate::bag::checksum::Checksum;
-use crate::bag::chunked::{ChunkHead, Connections, Counts, MessageHead, NoRecord, RecordHead};
+use crate::bag::chunked::{
+    ChunkHead, Connections, Counts, MessageHead, NoRecord, RecordHead, RecordKind,
+};
 use crate::bag::decompress::Compression;
 use crate::bag::model::{Connection, Encoding};
-use crate::bag::source::ByteStream;
+use crate::bag::source::{ByteStream, extended};
 use crate::base::budget::DEFINITIONS;
 use crate::base::time::Stamp;
 
@@ -41,63 +42,53 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
     let (kind, len) = head(stream)?;
     match kind {
         op::MESSAGE => return message(stream, len),
-        op::CHUNK => return chunk(stream, len).map(RecordHead::Chunk),
+        op::CHUNK => return chunk(stream, len).map(of_chunk),
         // A full disk leaves zeros.
         0 => return Err(NoRecord::Broken),
         _ => {}
     }
     // One flipped bit makes a chunk an index, a description, or the end of the file.
     if is_chunk_of(stream.peek(CHUNK_HEAD + 32)?, len) {
-        let chunk = chunk(stream, len)?;
-        return Ok(RecordHead::Chunk(ChunkHead {
-            misnamed: true,
-            ..chunk
-        }));
+        let mut chunk = chunk(stream, len)?;
+        chunk.misnamed = true;
+        return Ok(of_chunk(chunk));
     }
-    Ok(match kind {
+    let kind = match kind {
         op::MESSAGE_INDEX => index(stream, len)?,
-        op::STATISTICS if len >= STATISTICS as u64 => RecordHead::Total {
-            stated: counts(stream.peek(STATISTICS)?).ok_or(NoRecord::Cut)?,
-            len,
-        },
-        op::CHUNK_INDEX => listed(stream.peek(24)?, len).ok_or(NoRecord::Cut)?,
-        op::SCHEMA => RecordHead::Description {
-            what: Described::Schema,
-            len,
-        },
-        op::CHANNEL => RecordHead::Description {
-            what: Described::Channel,
-            len,
-        },
-        op::HEADER if !is_first => RecordHead::Unknown {
-            len,
-            extension: false,
-        },
+        op::STATISTICS if len >= STATISTICS as u64 => {
+            RecordKind::Total(counts(stream.peek(STATISTICS)?).ok_or(NoRecord::Cut)?)
+        }
+        op::CHUNK_INDEX => listed(stream.peek(24)?).ok_or(NoRecord::Cut)?,
+        op::SCHEMA => RecordKind::Description(Described::Schema),
+        op::CHANNEL => RecordKind::Description(Described::Channel),
+        op::HEADER if !is_first => RecordKind::Unknown { extension: false },
         op::HEADER | op::ATTACHMENT | op::METADATA => {
             let content = content_len(kind, stream.peek(MOST_LOOKED_AT)?);
             let is_long = content.is_none() && len > MOST_LOOKED_AT as u64;
             if !is_long && !content.is_some_and(|content| is_extended(content, len)) {
                 return Err(NoRecord::Broken);
             }
-            RecordHead::Other { len }
+            RecordKind::Other
         }
-        op::ATTACHMENT_INDEX | op::METADATA_INDEX | op::SUMMARY_OFFSET => RecordHead::Tail { len },
-        op::DATA_END if len == DATA_END => RecordHead::DataEnd {
-            len,
-            crc: data_crc(stream.peek(4)?),
-        },
-        op::FOOTER if len == FOOTER => RecordHead::FileEnd {
-            len,
-            crc: FieldCursor(stream.peek(20)?.get(16..).unwrap_or_default())
-                .u32()
-                .filter(|crc| *crc != 0),
-        },
+        op::ATTACHMENT_INDEX | op::METADATA_INDEX | op::SUMMARY_OFFSET => RecordKind::Tail,
+        op::DATA_END if len == DATA_END => RecordKind::DataEnd(data_crc(stream.peek(4)?)),
+        op::FOOTER if len == FOOTER => {
+            let crc = stream.peek(20)?.get(16..).unwrap_or_default();
+            RecordKind::FileEnd(FieldCursor(crc).u32().filter(|crc| *crc != 0))
+        }
         op::DATA_END | op::FOOTER => return Err(NoRecord::Broken),
-        kind => RecordHead::Unknown {
-            len,
+        kind => RecordKind::Unknown {
             extension: kind >= FIRST_EXTENSION,
         },
-    })
+    };
+    Ok(RecordHead { kind, len })
+}
+
+fn of_chunk(head: ChunkHead) -> RecordHead<Described> {
+    RecordHead {
+        len: head.packed.saturating_add(head.padding),
+        kind: RecordKind::Chunk(head),
+    }
 }
 
 /// The counts of the whole file in a statistics record.
@@ -117,20 +108,17 @@ pub(super) fn counts(record: &[u8]) -> Option<Counts> {
 /// before the record, whose head is constant.
 fn data_crc(content: &[u8]) -> Option<u32> {
     let stated = FieldCursor(content).u32().filter(|crc| *crc != 0)?;
-    let mut sum = Checksum::of(stated);
-    sum.add(&[op::DATA_END]);
-    sum.add(&DATA_END.to_le_bytes());
-    Some(sum.crc())
+    let sum = extended(stated, &[op::DATA_END]);
+    Some(extended(sum, &DATA_END.to_le_bytes()))
 }
 
 /// The chunk that a chunk index lists.
-fn listed(content: &[u8], len: u64) -> Option<RecordHead<Described>> {
+fn listed(content: &[u8]) -> Option<RecordKind<Described>> {
     let mut cursor = FieldCursor(content);
     let times = (cursor.u64()?, cursor.u64()?);
-    Some(RecordHead::Listed {
+    Some(RecordKind::Listed {
         at: cursor.u64()?,
         times: (Stamp::from_nanos(times.0), Stamp::from_nanos(times.1)),
-        len,
     })
 }
 
@@ -179,11 +167,15 @@ fn message(stream: &mut ByteStream<'_>, len: u64) -> Result<RecordHead<Described
     };
     let size = size.ok_or(NoRecord::Broken)?;
     stream.advance(MESSAGE_HEAD);
-    Ok(RecordHead::Message(MessageHead {
+    let head = MessageHead {
         raw: u32::from(raw),
         time: Stamp::from_nanos(time),
         size,
-    }))
+    };
+    Ok(RecordHead {
+        kind: RecordKind::Message(head),
+        len: u64::from(size),
+    })
 }
 
 /// The most bytes that unknown fields at the end of a record may take; with more, a length is damaged.
@@ -196,20 +188,18 @@ fn is_extended(content: u64, len: u64) -> bool {
 }
 
 /// Parses the head of a message index.
-fn index(stream: &mut ByteStream<'_>, len: u64) -> Result<RecordHead<Described>, NoRecord> {
+fn index(stream: &mut ByteStream<'_>, len: u64) -> Result<RecordKind<Described>, NoRecord> {
     let mut cursor = FieldCursor(stream.peek(6)?);
     let (channel, entries) = (cursor.u16(), cursor.u32().map(u64::from));
     let (Some(channel), Some(entries)) = (channel, entries) else {
         return Err(NoRecord::Cut);
     };
     if !is_extended(entries + 6, len) || entries % ENTRY as u64 != 0 {
-        let extension = false;
-        return Ok(RecordHead::Unknown { len, extension });
+        return Ok(RecordKind::Unknown { extension: false });
     }
-    Ok(RecordHead::Index {
+    Ok(RecordKind::Index {
         raw: u32::from(channel),
         count: u32::try_from(entries / ENTRY as u64).unwrap_or(u32::MAX),
-        len,
     })
 }
 
@@ -251,15 +241,11 @@ pub(super) fn chunk(stream: &mut ByteStream<'_>, len: u64) -> Result<ChunkHead, 
             .unwrap_or(0),
         plain,
         crc: (crc != 0).then_some(crc),
-        times: (last_is_known(times)).then_some(times),
+        // An empty chunk has zeros.
+        times: (times.0 <= times.1 && times.1 > Stamp(0)).then_some(times),
         misnamed: false,
         unclosed: false,
     })
-}
-
-/// Whether a chunk's times are stated: an empty one has zeros.
-fn last_is_known((first, last): (Stamp, Stamp)) -> bool {
-    first <= last && last > Stamp(0)
 }
 
 /// Whether a chunk begins here.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Described, Rosbag1};
-use crate::bag::chunked::{ChunkHead, Counts, MessageHead, NoRecord, RecordHead};
+use crate::bag::chunked::{ChunkHead, Counts, MessageHead, NoRecord, RecordHead, RecordKind};
 use crate::bag::decompress::Compression;
 use crate::bag::model::Connection;
 use crate::bag::source::ByteStream;
@@ -51,41 +51,30 @@ const LONGEST_HEADER: usize = 1 << 20;
 
 /// Takes the head of the next record.
 pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>, NoRecord> {
-    let (header, len) = header(stream)?;
-    let size = len;
-    let len = u64::from(len);
-    Ok(match header {
-        Header::Chunk { compression, size } => RecordHead::Chunk(chunk(&compression, size, len)),
-        Header::Message { raw, time } => RecordHead::Message(MessageHead { raw, time, size }),
-        Header::Connection { raw, topic } => RecordHead::Description {
-            what: Described { raw, topic },
-            len,
-        },
-        // Its length is computed from its count: writers of 2010 stored a wrong one.
-        Header::Index { raw, count } => RecordHead::Index {
-            raw,
-            count,
-            len: u64::from(count.checked_mul(ENTRY).ok_or(NoRecord::Broken)?),
-        },
-        Header::Bag { chunks, .. } => RecordHead::Total {
-            stated: Counts {
-                chunks,
-                ..Counts::default()
-            },
-            len,
-        },
+    let (header, size) = header(stream)?;
+    let mut len = u64::from(size);
+    let kind = match header {
+        Header::Chunk { compression, size } => RecordKind::Chunk(chunk(&compression, size, len)),
+        Header::Message { raw, time } => RecordKind::Message(MessageHead { raw, time, size }),
+        Header::Connection { raw, topic } => RecordKind::Description(Described { raw, topic }),
+        Header::Index { raw, count } => {
+            // Its length is computed from its count: writers of 2010 stored a wrong one.
+            len = u64::from(count.checked_mul(ENTRY).ok_or(NoRecord::Broken)?);
+            RecordKind::Index { raw, count }
+        }
+        Header::Bag { chunks, .. } => RecordKind::Total(Counts {
+            chunks,
+            ..Counts::default()
+        }),
         Header::ChunkInfo {
             pos, start, end, ..
-        } => RecordHead::Listed {
+        } => RecordKind::Listed {
             at: pos,
             times: (start, end),
-            len,
         },
-        Header::Unknown => RecordHead::Unknown {
-            len,
-            extension: false,
-        },
-    })
+        Header::Unknown => RecordKind::Unknown { extension: false },
+    };
+    Ok(RecordHead { kind, len })
 }
 
 /// The head of a chunk. A recorder writes the lengths when it closes the chunk.

@@ -1,33 +1,22 @@
-//! SQLite, opened so that nothing in a database can run, write or grow. The only file that uses `rusqlite`.
+//! SQLite, opened so that nothing in a database can run, write or grow, and no row is lost. The only file that knows `rusqlite`.
 
-use std::fmt;
+use std::fmt::Write as _;
+use std::fs;
 use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
 
+pub(super) use rusqlite::Error as Refusal;
 use rusqlite::config::DbConfig;
 use rusqlite::limits::Limit;
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, OpenFlags};
 
-use super::ready::{Ready, address};
+use crate::bag::source::Temporary;
+use crate::base::error::{Error, Result};
+use crate::base::file::with_suffix;
 
 /// An open database.
 pub(super) struct Db(Connection);
-
-/// An error of SQLite.
-#[derive(Debug)]
-pub(super) struct Refusal(rusqlite::Error);
-
-impl fmt::Display for Refusal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
-
-impl From<rusqlite::Error> for Refusal {
-    fn from(error: rusqlite::Error) -> Self {
-        Self(error)
-    }
-}
 
 /// The longest value that SQLite may produce, in bytes.
 const LONGEST_VALUE: i32 = 64 << 20;
@@ -38,10 +27,7 @@ pub(super) struct QueryRow<'r>(&'r rusqlite::Row<'r>);
 impl QueryRow<'_> {
     /// A column's integer; `None` if it has another type.
     pub(super) fn integer(&self, column: usize) -> Option<i64> {
-        match self.0.get_ref(column).ok()? {
-            ValueRef::Integer(n) => Some(n),
-            _ => None,
-        }
+        self.0.get(column).ok()
     }
 
     /// A column's text, with invalid UTF-8 replaced; `None` if it has another type.
@@ -54,10 +40,7 @@ impl QueryRow<'_> {
 
     /// A column's bytes, of text or a blob; `None` if it has another type.
     pub(super) fn bytes(&self, column: usize) -> Option<&[u8]> {
-        match self.0.get_ref(column).ok()? {
-            ValueRef::Blob(bytes) | ValueRef::Text(bytes) => Some(bytes),
-            _ => None,
-        }
+        self.0.get_ref(column).ok()?.as_bytes().ok()
     }
 }
 
@@ -137,4 +120,100 @@ impl Db {
         })?;
         Ok(picked)
     }
+}
+
+// Where a database can be opened so that no row is lost and no file is created beside the user's.
+
+/// A database ready to be opened.
+pub(super) struct Ready {
+    pub(super) path: PathBuf,
+    /// Whether the database is cut or damaged, and is read as far as possible.
+    pub(super) damaged: bool,
+    /// Whether rows are ignored because the copy would be too large.
+    pub(super) left_behind: bool,
+    /// The copy, removed when the bag has been read.
+    copy: Option<Temporary>,
+    /// Whether a recorder writes to a log beside the database, which is read too.
+    is_shared: bool,
+}
+
+impl Ready {
+    /// A database that is read without a copy, with its log if it has one.
+    pub(super) fn growing(path: &Path, has_log: bool) -> Self {
+        Self {
+            path: path.to_owned(),
+            damaged: false,
+            left_behind: false,
+            copy: None,
+            is_shared: has_log,
+        }
+    }
+
+    /// Whether it is our own copy, which SQLite may recover; otherwise it must not modify the file.
+    pub(super) fn is_copy(&self) -> bool {
+        self.copy.is_some()
+    }
+}
+
+/// The largest database that is copied, in bytes: 16 GiB.
+const LARGEST_COPY: u64 = 16 << 30;
+
+/// Copies a database with its newest rows in a log or journal beside it that was never merged.
+pub(super) fn ready(path: &Path) -> Result<Ready> {
+    let beside: Vec<PathBuf> = ["-wal", "-journal"]
+        .iter()
+        .map(|end| with_suffix(path, end))
+        .filter(|p| p.metadata().is_ok_and(|m| m.is_file() && m.len() > 0))
+        .collect();
+    let mut ready = Ready::growing(path, false);
+    if beside.is_empty() {
+        return Ok(ready);
+    }
+    let all = || beside.iter().map(PathBuf::as_path).chain([path]);
+    let size: u64 = all().filter_map(|p| Some(p.metadata().ok()?.len())).sum();
+    if size > LARGEST_COPY {
+        ready.left_behind = true;
+        return Ok(ready);
+    }
+    let copy = Temporary::new()?;
+    for from in all() {
+        let to = copy.path().join(from.file_name().unwrap_or_default());
+        fs::copy(from, to).map_err(Error::io("copy", from))?;
+    }
+    ready.path = copy.path().join(path.file_name().unwrap_or_default());
+    ready.copy = Some(copy);
+    Ok(ready)
+}
+
+/// The URI under which SQLite opens the file.
+pub(super) fn address(ready: &Ready) -> String {
+    let mut address = "file:".to_owned();
+    for byte in bytes(&ready.path) {
+        if byte.is_ascii_alphanumeric() || b"/._-~".contains(&byte) {
+            address.push(byte as char);
+        } else {
+            let _ = write!(address, "%{byte:02x}");
+        }
+    }
+    address += if ready.is_copy() {
+        "?mode=rw"
+    } else if ready.is_shared {
+        "?mode=ro"
+    } else {
+        "?mode=ro&immutable=1"
+    };
+    address
+}
+
+#[cfg(unix)]
+fn bytes(path: &Path) -> Vec<u8> {
+    std::os::unix::ffi::OsStrExt::as_bytes(path.as_os_str()).to_vec()
+}
+
+#[cfg(not(unix))]
+fn bytes(path: &Path) -> Vec<u8> {
+    let text = path.to_string_lossy().replace('\\', "/");
+    // A drive letter needs a slash before it.
+    let slash = if text.get(1..2) == Some(":") { "/" } else { "" };
+    format!("{slash}{text}").into_bytes()
 }

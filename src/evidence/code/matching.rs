@@ -596,11 +596,6 @@ impl<'a> Launches<'a> {
     }
 }
 
-/// Whether two nodes have the same name, ignoring namespaces.
-fn is_same_name(a: &str, b: &str) -> bool {
-    last_part(a) == last_part(b)
-}
-
 /// The reason against an edge; `None` if there is none.
 fn reason(
     candidates: &[&Candidate<'_>],
@@ -616,7 +611,8 @@ fn reason(
         return Some(NotDrawn::KnownPublisher);
     }
     let owner = (bag.owner)(&known.kind(found.topic), &known.text(found.topic));
-    let is_owner = |owner: &String| candidates.iter().any(|c| is_same_name(&c.node, owner));
+    let is_same = |owner: &str, c: &Candidate<'_>| last_part(&c.node) == last_part(owner);
+    let is_owner = |owner: &String| candidates.iter().any(|c| is_same(owner, c));
     if found.role == Role::Publishes && owner.is_some_and(|owner| !is_owner(&owner)) {
         return Some(NotDrawn::OwnedType);
     }

@@ -1,7 +1,8 @@
 //! A message as data, decoded by its own definition, for messages whose layout has changed over the years; and known layouts,
-//! recognised by type, and by definition or hash.
+//! recognised by type, and by definition or hash: first of all log records.
 
 use crate::bag::{Connection, Encoding};
+use crate::base::name::plain_type;
 use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
 use crate::evidence::message::definition::{self, Form};
 
@@ -344,6 +345,79 @@ pub(crate) fn outline(definition: &str, type_name: &str, form: Form) -> Vec<(Str
         .iter()
         .map(|message| (message.name.clone(), fields(message)))
         .collect()
+}
+
+// A log record of ROS 1 (`rosgraph_msgs/Log`) or ROS 2 (`rcl_interfaces/msg/Log`): its logger, text and source file.
+
+/// A log record.
+#[derive(Default)]
+pub(crate) struct LogRecord<'a> {
+    /// The name of the node or logger in the record.
+    pub(crate) name: &'a str,
+    /// The full name of the node, or of the logger, which is a node or a part of one.
+    pub(crate) logger: String,
+    pub(crate) text: &'a str,
+    /// `logs`, or for a warning or an error `logs WARN`, `logs ERROR` or `logs FATAL`.
+    pub(crate) logs: &'static str,
+    /// The path of the source file as recorded by the compiler or interpreter.
+    pub(crate) file: &'a str,
+    /// The number of the record among those of its node; `None` in ROS 2.
+    pub(crate) number: Option<u32>,
+    /// The topics of the node, as far as roscpp and rospy list them; none in ROS 2.
+    pub(crate) topics: Vec<&'a str>,
+}
+
+/// Whether a type is that of log records of ROS 1.
+pub(crate) fn is_ros1_log(type_name: &str) -> bool {
+    ["rosgraph_msgs/Log", "roslib/Log"].contains(&&*plain_type(type_name))
+}
+
+impl<'a> LogRecord<'a> {
+    /// Reads a whole record, of ROS 1 or of ROS 2.
+    ///
+    /// # Errors
+    /// If it has another layout.
+    pub(crate) fn read(payload: &mut PayloadCursor<'a>, is_ros1: bool) -> PayloadResult<Self> {
+        let number = if is_ros1 {
+            payload.header()?.number
+        } else {
+            payload.time()?;
+            None
+        };
+        let level = payload.u8()?;
+        let name = payload.string()?;
+        let logger = if is_ros1 || name.is_empty() {
+            name.to_owned()
+        } else {
+            format!("/{}", name.trim_start_matches('/').replace('.', "/"))
+        };
+        let (text, file) = (payload.string()?, payload.string()?);
+        payload.skip_string()?;
+        payload.u32()?;
+        let listed = if is_ros1 { payload.length(4)? } else { 0 };
+        let topics = (0..listed).map(|_| payload.string());
+        let topics = topics.collect::<PayloadResult<_>>()?;
+        payload.finish()?;
+        Ok(Self {
+            name,
+            logger,
+            text,
+            logs: match (is_ros1, level) {
+                (true, 4) | (false, 30) => "logs WARN",
+                (true, 8) | (false, 40) => "logs ERROR",
+                (true, 16) | (false, 50) => "logs FATAL",
+                _ => "logs",
+            },
+            file,
+            number,
+            topics,
+        })
+    }
+
+    /// The source file's name without folders.
+    pub(crate) fn file_name(&self) -> &'a str {
+        self.file.rsplit(['/', '\\']).next().unwrap_or(self.file)
+    }
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ use crate::base::csv;
 use crate::base::ids::Few;
 use crate::base::name::{last_part, resolved};
 use crate::evidence::inference::{Conclusions, ElementKey, verb};
-use crate::evidence::message::log::LogRecord;
+use crate::evidence::message::dynamic::LogRecord;
 use crate::evidence::observation::{Name, Observation, SourceId};
 
 const TABLE: &str = include_str!("contracts.csv");

@@ -11,10 +11,8 @@ use crate::base::name::{in_space, is_log, plain_type};
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::message::cursor::PayloadCursor;
-use crate::evidence::message::dynamic::{MessageSchema, MessageValue};
-use crate::evidence::message::log::LogRecord;
-use crate::evidence::observation::{Confidence, Name, SourceId};
-use crate::evidence::observation::{LoggedText, ShownValue};
+use crate::evidence::message::dynamic::{LogRecord, MessageSchema, MessageValue};
+use crate::evidence::observation::{Confidence, LoggedText, Name, ShownValue, SourceId};
 
 /// The fewest different values that are significant: two may agree by chance, and numbers are more often equal than words. With
 /// fewer, a text `state: 3` beside a counter would be an echo of it; with more, short recordings of a talker would show none.

@@ -10,7 +10,7 @@ use crate::base::time::Stamp;
 use crate::evidence::inference::{
     Conclusions, ElementKey, IncidentKind, Inference, Reliability, Stream, Validity, verb,
 };
-use crate::evidence::message::log::{LogRecord, is_ros1_log};
+use crate::evidence::message::dynamic::{LogRecord, is_ros1_log};
 use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
 use crate::evidence::source::{SHARED, SourceContext};
 use crate::evidence::source_id;

@@ -7,8 +7,7 @@ use crate::base::name::is_recorder;
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind, Inference, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::message::dynamic::MessageLayout;
-use crate::evidence::message::log::LogRecord;
+use crate::evidence::message::dynamic::{LogRecord, MessageLayout};
 use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
 use crate::evidence::source::SourceContext;
 

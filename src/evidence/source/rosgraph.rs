@@ -1,5 +1,5 @@
-//! Snapshots of the graph of ROS 2: `/rosgraph` of graph-monitor, each message a whole graph, and `/nodl/observed_node`
-//! of nodl, each message one node.
+//! Snapshots of the graph of ROS 2: `/rosgraph` of graph-monitor, each message a whole graph, `/nodl/observed_node` of nodl, each
+//! message one node, and `ros_discovery_info` of DDS, each message one participant.
 //!
 //! The definitions have moved and grown (`rosgraph_monitor_msgs`, then `rosgraph_msgs`, twice), so a message
 //! is parsed by the definition in the bag, or by the built-in one that it matches exactly.
@@ -8,10 +8,10 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 
 use super::SourceContext;
+use crate::base::digest::hex_of;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind, verb};
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::message::dynamic::MessageLayout;
-use crate::evidence::message::dynamic::{MessageSchema, MessageValue};
+use crate::evidence::message::dynamic::{MessageLayout, MessageSchema, MessageValue};
 use crate::evidence::observation::{Name, Observation, SourceId};
 
 /// `rosgraph_msgs/msg/Graph`.
@@ -318,4 +318,50 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             known.incident(source, what, kind, *time);
         }
     }
+}
+
+// `ros_discovery_info`: the nodes of each participant of DDS (`rmw_dds_common/msg/ParticipantEntitiesInfo`).
+
+/// `rmw_dds_common/msg/ParticipantEntitiesInfo`; its identifiers have 24 bytes up to Humble, 16 since.
+pub(crate) const PARTICIPANT: MessageLayout =
+    MessageLayout::ros2("rmw_dds_common/ParticipantEntitiesInfo", "");
+
+/// The participant of a participant: namespace and name.
+type ParticipantNodes<'a> = Vec<(&'a str, &'a str)>;
+
+pub(crate) fn read_participant(
+    context: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
+    let mut long = payload.clone();
+    let (id, participant) = participant(payload, 16).or_else(|_| participant(&mut long, 24))?;
+    let id = hex_of(id);
+    let group = context.name(&format!("participant {id}"));
+    for (space, name) in participant {
+        let full = format!("{}/{name}", space.trim_end_matches('/'));
+        let node = context.name(&full);
+        let words = || format!("{full} is a node of participant {id}");
+        context.states_in(group, Observation::Node(node), words);
+    }
+    context.states(Observation::Snapshot(group), String::new);
+    Ok(())
+}
+
+/// The participant and its participant, if identifiers of `gid` bytes use the payload up exactly.
+fn participant<'a>(
+    payload: &mut PayloadCursor<'a>,
+    gid: usize,
+) -> cursor::PayloadResult<(&'a [u8], ParticipantNodes<'a>)> {
+    let id = payload.bytes(gid)?;
+    let mut participant = Vec::new();
+    for _ in 0..payload.length(16)? {
+        participant.push((payload.string()?, payload.string()?));
+        for _ in 0..2 {
+            for _ in 0..payload.length(gid)? {
+                payload.bytes(gid)?;
+            }
+        }
+    }
+    payload.finish()?;
+    Ok((id, participant))
 }

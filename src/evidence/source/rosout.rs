@@ -6,11 +6,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use crate::base::name::{LOGS, in_space, is_log, is_player};
+use crate::base::name::{LOGS, in_space, is_log, is_player, role};
 use crate::base::rhythm::FIRST_RECORD;
-use crate::base::role::role;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
-use crate::evidence::message::log::LogRecord;
+use crate::evidence::message::dynamic::LogRecord;
 use crate::evidence::observation::{Confidence, Name, Observation, Observations, SourceId};
 use crate::evidence::source::SourceContext;
 

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 use crate::base::error::{Error, Result};
-use crate::base::leftovers::Leftover;
+use crate::base::file::Leftover;
 
 /// Files that appear together in a folder. Dropped without [`Folder::commit`], they are removed.
 #[derive(Debug)]

@@ -4,9 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use crate::base::ids::Few;
-use crate::base::name::{is_feedback, is_log, lies_in};
+use crate::base::name::{is_feedback, is_log, lies_in, role, start};
 use crate::base::rhythm::{CROWD_NS, FOUND_NS, TOGETHER_NS, broken_after};
-use crate::base::role::{role, start};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;

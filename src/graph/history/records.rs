@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::base::error::Result;
 use crate::base::ids::Few;
-use crate::base::role::role;
+use crate::base::name::role;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
@@ -16,9 +16,8 @@ use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::lifetimes::{Lifetime, Liveness, LivenessOf, compute_lifetimes};
 use crate::graph::history::liveness::{collect, fall_silent};
 use crate::graph::history::pauses::pauses;
-use crate::graph::history::recordings::doubled;
 use crate::graph::history::restarts::restarts;
-use crate::graph::history::senders::{Sender as TopicSender, Traffic};
+use crate::graph::history::senders::{Sender as TopicSender, Traffic, doubled};
 use crate::graph::history::simulation::{Simulation, simulation};
 use crate::graph::history::{
     Bound, Life, Sender, Sending, Silence, Stretch, Transition, all_silent,

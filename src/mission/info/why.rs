@@ -4,9 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use crate::base::error::{Error, Result};
-use crate::base::name::{is_quiet, last_part};
+use crate::base::name::{is_named, is_quiet, last_part};
 use crate::base::nearest::nearest;
-use crate::base::role::is_named;
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
 use crate::evidence::EvidenceLine;

@@ -1,10 +1,12 @@
-//! Parameter events of ROS 2 (`rcl_interfaces/msg/ParameterEvent`): parameters of a node that were declared or set.
+//! Events of ROS 2 on topics of their own: parameters that were declared or set, lifecycle transitions, and introspected services.
 
 use std::collections::BTreeSet;
 
-use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
+use crate::base::digest::hex_of;
+use crate::base::name::SERVICE;
+use crate::evidence::message::cursor::{self, PayloadCursor, PayloadResult};
 use crate::evidence::message::dynamic::MessageLayout;
-use crate::evidence::observation::Observation;
+use crate::evidence::observation::{Confidence, Observation};
 use crate::evidence::source::SourceContext;
 
 /// `rcl_interfaces/msg/ParameterEvent`.
@@ -137,6 +139,91 @@ fn end_of(parameter: &str) -> Option<(&str, bool)> {
         _ => return None,
     };
     topic.starts_with('/').then_some((topic, publishes))
+}
+
+// `<node>/transition_event` of ROS 2: a node is running, with its lifecycle state.
+
+/// `lifecycle_msgs/msg/TransitionEvent`.
+pub(crate) const TRANSITION: MessageLayout = MessageLayout::ros2(
+    "lifecycle_msgs/TransitionEvent",
+    "uint64 timestamp;Transition transition;State start_state;State goal_state
+     Transition: byte id;string label
+     State: byte id;string label",
+);
+
+pub(crate) fn read_transition(
+    context: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
+    payload.u64()?;
+    payload.u8()?;
+    let transition = payload.string()?;
+    payload.u8()?;
+    let from = payload.string()?;
+    payload.u8()?;
+    let to = payload.string()?;
+    payload.finish()?;
+    let topic = context.stream.connection.topic.shared();
+    let Some(name) = topic.strip_suffix("/transition_event") else {
+        return Ok(());
+    };
+    let node = context.name(name);
+    let state = context.name(to);
+    let words = || format!("{name} goes from {from} to {to} ({transition})");
+    context.states(Observation::Publish(node, context.stream.topic), words);
+    context.states(Observation::Lifecycle(node, state), words);
+    Ok(())
+}
+
+// Service introspection (`<service>/_service_event`): requests and replies of a service, and its client and
+// its server if the recorder names publishers.
+
+/// `<service type>_Event`: it begins with `service_msgs/msg/ServiceEventInfo`, with any fields after it.
+pub(crate) const SERVICE_EVENT: MessageLayout = MessageLayout::ros2("*_Event", "");
+
+pub(crate) fn read_service(
+    context: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
+    let topic = context.stream.connection.topic.shared();
+    let Some(service) = topic.strip_suffix("/_service_event") else {
+        return Ok(());
+    };
+    let kind = payload.u8()?;
+    payload.time()?;
+    let client = payload.bytes(16)?;
+    payload.i64()?;
+    let word = match kind {
+        0 => "request sent",
+        1 => "request received",
+        2 => "reply sent",
+        3 => "reply received",
+        _ => return Err(payload.wrong("a kind of event")),
+    };
+    let client = hex_of(client);
+    let of = context.stream.topic;
+    if !service.contains("/_action/") {
+        let kind = context.stream.connection.type_name.clone();
+        let kind = context.name(kind.strip_suffix("_Event").unwrap_or(SERVICE));
+        let called = context.name(service);
+        let end = match (context.stream.publisher, word) {
+            (None, _) => Observation::Topic(called),
+            (Some(node), "request sent" | "reply received") => Observation::Publish(node, called),
+            (Some(node), _) => Observation::Subscribe(node, called),
+        };
+        context.observation(end, Confidence::Measured, || {
+            format!("{service}: {word}, client {client}")
+        });
+        if context.stream.publisher.is_none() {
+            let client = context.name(&client);
+            context.states(Observation::Calls(called, client), String::new);
+        }
+        let known = Observation::Type(called, kind);
+        context.observation(known, Confidence::Measured, String::new);
+    }
+    let words = || format!("{service}: {word}, client {client}");
+    context.observation(Observation::Topic(of), Confidence::Measured, words);
+    Ok(())
 }
 
 #[cfg(test)]
