@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
-use super::subplan::Subplan;
+use super::parts::Subplan;
 use super::{Draft, PlacedPart};
 use crate::base::geometry::{Point, Rect, Size, polyline};
 use crate::layout::routes::around::{End, Map, meets};

@@ -2,7 +2,7 @@
 //!
 //! Each row is a separate layout; the edges between rows run through the channels between them.
 
-use super::subplan::Subplan;
+use super::parts::Subplan;
 use super::{Draft, PlacedPart};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::layout::routes::around::{End, Map};
