@@ -2,10 +2,8 @@
 //!
 //! In comes a [`Sequence`](sequence::Sequence): a mission, its view, and the drawings of its windows; out come files, each whole
 //! or not at all. Open `encoder` first: what a format is. `run` draws each frame once and passes it to every output;
-//! `target`, `check` and `sink` are about files; the other files are formats.
+//! `target` and `sink` are about files; the other files are formats.
 
-mod animated_svg;
-pub(crate) mod check;
 pub(crate) mod dot;
 pub(crate) mod encoder;
 mod gif;
@@ -13,7 +11,6 @@ pub(crate) mod html;
 mod json;
 pub(crate) mod markdown;
 pub(crate) mod mermaid;
-pub mod options;
 pub(crate) mod palette;
 #[cfg(feature = "parquet")]
 pub(crate) mod parquet;
@@ -39,7 +36,6 @@ pub use encoder::Written;
 use encoder::{DATA, GRAPH, IMAGE, LOOK, PICTURE, WORDS};
 pub use encoder::{DrawnFrame, Encoder, Needs, OneDrawing, OutputFormat, Packet};
 pub(crate) use encoder::{Started, at_end, one_file, one_text, text_per_window};
-use sequence::Shows;
 use tables::TableFormat;
 use target::Target;
 pub(crate) use tex::needs_figure;
@@ -56,10 +52,7 @@ pub const FORMATS: &[OutputFormat] = &[
     OutputFormat {
         word: "svg",
         what: "a drawing per window with `{n}`, otherwise an animation",
-        start: |sequence, target| match sequence.shows(target, OneDrawing::Asked) {
-            Shows::Film => animated_svg::start(sequence, target),
-            shows => Ok(still::start(sequence, target, StillKind::Svg, shows)),
-        },
+        start: |sequence, target| still::start(sequence, target, StillKind::Svg),
         whole: OneDrawing::Asked,
         takes_together: "frame-ms strip",
         ..IMAGE
@@ -67,19 +60,13 @@ pub const FORMATS: &[OutputFormat] = &[
     OutputFormat {
         word: "png",
         what: "an image per window with `{n}`, otherwise a film strip",
-        start: |sequence, target| {
-            let shows = sequence.shows(target, OneDrawing::Always);
-            Ok(still::start(sequence, target, StillKind::Png, shows))
-        },
+        start: |sequence, target| still::start(sequence, target, StillKind::Png),
         ..IMAGE
     },
     OutputFormat {
         word: "webp",
         what: "an image per window with `{n}`, otherwise a film strip",
-        start: |sequence, target| {
-            let shows = sequence.shows(target, OneDrawing::Always);
-            Ok(still::start(sequence, target, StillKind::WebP, shows))
-        },
+        start: |sequence, target| still::start(sequence, target, StillKind::WebP),
         ..IMAGE
     },
     OutputFormat {
@@ -201,10 +188,10 @@ impl Output {
 /// the inputs and other files that are read, which are never overwritten.
 ///
 /// # Errors
-/// As [`check::check`], and [`Error::Output`] if a format's requirements are not met.
+/// As [`target::check`], and [`Error::Output`] if a format's requirements are not met.
 pub(crate) fn check(outputs: &[Output], kept: &[PathBuf]) -> Result<()> {
     let targets: Vec<Target> = outputs.iter().flat_map(files).collect();
-    check::check(&targets, kept)?;
+    target::check(&targets, kept)?;
     outputs
         .iter()
         .try_for_each(|o| o.format.check.map_or(Ok(()), |check| check(&o.target)))

@@ -7,18 +7,15 @@
 
 mod caption;
 mod choose;
-mod filtered;
 mod fold;
 mod frames;
 mod items;
 mod listed;
-mod marked;
-pub(crate) mod news;
+pub(crate) mod marked;
 mod omitted;
 mod options;
 mod shown;
 mod state;
-mod steady;
 mod still;
 
 use std::sync::Arc;
@@ -27,12 +24,10 @@ use crate::base::ids::ids;
 use crate::base::notice::Notices;
 use crate::graph::{ById, Element};
 use crate::mission::Mission;
-
-pub(crate) use filtered::filtered;
+pub(crate) use choose::filtered;
 pub use fold::box_rows::BoxRow;
-pub(crate) use fold::namespaces::COMMON;
 pub use fold::namespaces::Collapsible;
-pub(crate) use fold::namespaces::headlines;
+pub(crate) use fold::namespaces::{COMMON, headlines};
 pub(crate) use frames::{BETWEEN_PHRASES, Words, joined};
 pub use frames::{Frame, Headline, Phrase};
 pub(crate) use listed::{DrawnPart, drawn_part};

@@ -457,9 +457,7 @@ impl PlacedPart {
             clusters: self.clusters.iter().map(rect).collect(),
         }
     }
-}
 
-impl PlacedPart {
     /// The block with the places that its labels probably take, so that they do not cover the block next to it.
     fn with_labels(&self, task: PartTask<'_>) -> Rect {
         let block = Rect::new(0.0, 0.0, self.size.w, self.size.h);

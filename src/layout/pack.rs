@@ -11,20 +11,13 @@ pub(crate) fn pack(sizes: &[Size], page: Size, gap: f64) -> (Vec<Point>, Size) {
     let widest = sizes.iter().map(|size| size.w).fold(0.0, f64::max);
     let area: f64 = sizes.iter().map(|s| (s.w + gap) * (s.h + gap)).sum();
     let ideal = (area * page.w / page.h).sqrt();
-    (0..24)
-        .map(|step| {
-            shelves(
-                sizes,
-                widest.max(ideal * (0.8 + 0.05 * f64::from(step))),
-                (gap, gap),
-            )
-        })
-        .map(|(places, whole)| (fit(whole, page), places, whole))
-        .reduce(|best, next| if next.0 > best.0 { next } else { best })
-        .map_or_else(
-            || (Vec::new(), Size::default()),
-            |(_, places, whole)| (places, whole),
-        )
+    let tried = (0..24).map(|step| {
+        let width = widest.max(ideal * (0.8 + 0.05 * f64::from(step)));
+        let (places, whole) = shelves(sizes, width, gap);
+        (fit(whole, page), (places, whole))
+    });
+    let best = tried.reduce(|best, next| if next.0 > best.0 { next } else { best });
+    best.map(|(_, packed)| packed).unwrap_or_default()
 }
 
 /// Top left corners for blocks of these sizes, at least `gap` from what the others take (`taken`, for each block relative
@@ -42,22 +35,17 @@ pub(crate) fn nested(
     let mut places = vec![Point::default(); sizes.len()];
     let (mut whole, mut full) = (Size::default(), Vec::<Rect>::new());
     for i in order {
-        let start = || std::iter::once(0.0);
-        let mut xs: Vec<f64> = start()
-            .chain(full.iter().map(|r| r.right() + gap))
-            .collect();
-        let mut ys: Vec<f64> = start()
-            .chain(full.iter().map(|r| r.bottom() + gap))
-            .collect();
-        for along in [&mut xs, &mut ys] {
-            along.sort_by(f64::total_cmp);
-            along.dedup_by(|a, b| (*a - *b).abs() < SAME);
-        }
+        let starts = |end: fn(&Rect) -> f64| {
+            let ends = full.iter().map(|taken| end(taken) + gap);
+            let mut starts: Vec<f64> = std::iter::once(0.0).chain(ends).collect();
+            starts.sort_by(f64::total_cmp);
+            starts.dedup_by(|a, b| (*a - *b).abs() < SAME);
+            starts
+        };
+        let (xs, ys) = (starts(Rect::right), starts(Rect::bottom));
         let mut best: Option<(f64, Point, Size)> = None;
-        for at in ys
-            .iter()
-            .flat_map(|y| xs.iter().map(|x| Point::new(*x, *y)))
-        {
+        let corners = ys.iter();
+        for at in corners.flat_map(|y| xs.iter().map(|x| Point::new(*x, *y))) {
             let size = Size::new(
                 whole.w.max(at.x + sizes[i].w),
                 whole.h.max(at.y + sizes[i].h),
@@ -89,19 +77,19 @@ pub(crate) fn fit(whole: Size, page: Size) -> f64 {
 
 /// The corners of blocks on shelves of this width, the highest blocks first, and the total size; `gap` is the
 /// space between blocks side by side, and between shelves.
-fn shelves(sizes: &[Size], width: f64, gap: (f64, f64)) -> (Vec<Point>, Size) {
+fn shelves(sizes: &[Size], width: f64, gap: f64) -> (Vec<Point>, Size) {
     let mut order: Vec<usize> = (0..sizes.len()).collect();
     order.sort_by(|&a, &b| sizes[b].h.total_cmp(&sizes[a].h).then(a.cmp(&b)));
     let mut places = vec![Point::default(); sizes.len()];
     let (mut x, mut y, mut shelf, mut whole) = (0.0, 0.0, 0.0_f64, Size::default());
     for i in order {
         if x > 0.0 && x + sizes[i].w > width {
-            (x, y) = (0.0, y + shelf + gap.1);
+            (x, y) = (0.0, y + shelf + gap);
             shelf = 0.0;
         }
         places[i] = Point::new(x, y);
         whole = Size::new(whole.w.max(x + sizes[i].w), whole.h.max(y + sizes[i].h));
-        x += sizes[i].w + gap.0;
+        x += sizes[i].w + gap;
         shelf = shelf.max(sizes[i].h);
     }
     (places, whole)

@@ -12,16 +12,14 @@ use crate::base::notice::NoticeKind;
 use crate::base::time::Period;
 use crate::base::{budget, file, words};
 use crate::export::Output;
-use crate::export::check::{check as check_targets, make_folder};
 use crate::export::sink::write_file;
-use crate::export::target::Target;
+use crate::export::target::{Target, check as check_targets, make_folder};
 use crate::gate::{
     DiffSubject, Difference, Expectation, ReportFormat, Runs, Side, Subject, Verdict, differences,
     judge, pairs, unchecked, union, update, write,
 };
 use crate::graph::window::Length;
-use crate::mission::Mission;
-use crate::mission::RATE_CHANGE;
+use crate::mission::{Mission, RATE_CHANGE};
 
 /// One report of a check or a comparison, to write to a file.
 #[derive(Clone, Debug)]

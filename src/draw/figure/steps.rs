@@ -1,12 +1,12 @@
 //! Steps: a panel per reconfiguration with only what changes and its direct partners, in order of time.
 
-use super::page::FigureSheet;
+use super::FigureSheet;
 use crate::base::geometry::{Point, Rect, Size};
 use crate::base::words;
 use crate::draw::scene::{Scene, Stroke};
 use crate::draw::style::Color;
 use crate::draw::timeline::canvas::{HAIRLINE, PX_PER_MM, PaperCanvas, Type, ink};
-use crate::draw::timeline::notes::{Unbroken, flow, flow_at, sentence};
+use crate::draw::timeline::legend::{Unbroken, flow, flow_at, sentence};
 use crate::mission::EventId;
 
 /// The space between two panels, inside their borders, and between the head of a panel and its graph, in millimetres: what

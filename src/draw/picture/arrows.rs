@@ -1,16 +1,18 @@
-//! Publications and subscriptions: their routes, rates and signs of change.
+//! Publications and subscriptions: their routes, rates and signs of change, and the lines of a window.
 
-use super::ids::{class, reported};
-use super::options::{self, ArrowLook};
-use super::page::{GraphFit, GraphPen};
-use super::texts::{LINE, arrow_label};
-use super::{badge, texts, topics};
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::options::{self, ArrowLook, Spotlight};
+use super::texts::{self, LINE, arrow_label, class, reported};
+use super::{GraphFit, GraphPen, Picture, badge, measured};
 use crate::base::geometry::{Point, Rect, Size, after, on_cubic, polyline};
-use crate::draw::scene::{Anchor, Font, Form, Group, Shape, Step, Stroke, Text, polygon};
+use crate::draw::scene::{Anchor, Font, Form, Group, Piece, Shape, Step, Stroke, Text, polygon};
 use crate::draw::style::Color;
 use crate::draw::text::Weight;
+use crate::graph::Id as _;
 use crate::layout::Route;
-use crate::view::{Arrow, ArrowKind, Mark, Shown};
+use crate::view::{Arrow, ArrowId, ArrowKind, Mark, SeenWindow, Shown};
 
 /// The number of straight pieces in which a curve is measured: with ten, its length is exact to a hundredth.
 const PIECES: u32 = 10;
@@ -313,7 +315,7 @@ impl GraphPen<'_> {
             style.size * self.fit.scale,
             style.halo_width * self.fit.scale,
         );
-        let rows = topics::rows(shown, &track.topics);
+        let rows = texts::rows(shown, &track.topics);
         let edge = place.middle(halo);
         let middle = rows.len() as f64 / 2.0 - 0.5;
         // If there are fewer rows than in other windows, they stay next to the line.
@@ -419,13 +421,71 @@ fn at_part(points: &[Point], length: f64, part: f64) -> Point {
     for pair in points.windows(2) {
         let step = pair[0].distance(pair[1]);
         if step >= left && step > 0.0 {
-            let t = left / step;
-            return Point::new(
-                pair[0].x + (pair[1].x - pair[0].x) * t,
-                pair[0].y + (pair[1].y - pair[0].y) * t,
-            );
+            return pair[0].towards(pair[1], left / step);
         }
         left -= step;
     }
     points.last().copied().unwrap_or_default()
+}
+
+// The lines of a window: those of a namespace merged while they are unchanged, and one label for each fork.
+
+impl Picture<'_> {
+    /// The glows of the lines of a window, which cover no head of another, the lines, and their labels; changed ones last, so
+    /// that they are on top.
+    pub(super) fn lines(
+        &self,
+        seen: &SeenWindow,
+        spotlight: Option<&Spotlight<'_>>,
+    ) -> [Vec<Group>; 3] {
+        let measured = &self.measured;
+        let links = &measured.graph.plan.links;
+        let look = |id: ArrowId| measured::find(&seen.arrows, id.at());
+        let mut drawn = Vec::new();
+        let mut in_gates = BTreeSet::new();
+        for (gate, path) in &self.gates {
+            if let Some((shown, lines)) = gate.shown(measured.view, look) {
+                in_gates.extend(lines);
+                drawn.push((
+                    &gate.arrow,
+                    path,
+                    Cow::Owned(shown),
+                    links[gate.lead.at()].fork,
+                ));
+            }
+        }
+        for &id in self.order.iter().filter(|id| !in_gates.contains(id)) {
+            let (arrow, path) = (&measured.view.arrows[id], &self.tracks[id.at()]);
+            if let Some(shown) = look(id) {
+                drawn.push((arrow, path, Cow::Borrowed(shown), links[id.at()].fork));
+            }
+        }
+        drawn.sort_by_key(|(.., shown, _)| shown.mark.is_some());
+        // The lines of a fork have one label: that of a line that changed, which is on top.
+        let mut last: BTreeMap<usize, usize> = BTreeMap::new();
+        for (k, (.., fork)) in drawn.iter().enumerate() {
+            last.extend(fork.map(|fork| (fork, k)));
+        }
+        let pen = self.pen();
+        let mut groups = [(); 3].map(|()| Vec::new());
+        for (arrow, path, shown, fork) in &drawn {
+            let ends = [arrow.from, arrow.to].map(|id| measured::find(&seen.items, id.at()));
+            let mut parts = pen.arrow_parts(arrow, path, shown, ends);
+            let spot = spotlight.filter(|spot| !spot.has_line(arrow, shown));
+            for part in &mut parts {
+                spot.inspect(|spot| spot.pale(part));
+            }
+            let named = fork.and_then(|fork| last.get(&fork)).map(|at| drawn[*at].1);
+            if named.is_some_and(|other| {
+                !std::ptr::eq(other, *path) && other.label_area() == path.label_area()
+            }) {
+                let label = &mut parts[2].pieces;
+                label.retain(|piece| !matches!(piece, Piece::Text(_)));
+            }
+            for (group, part) in groups.iter_mut().zip(parts) {
+                group.extend(Some(part).filter(|part| !part.pieces.is_empty()));
+            }
+        }
+        groups
+    }
 }

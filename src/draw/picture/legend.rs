@@ -3,8 +3,7 @@
 use super::arrows::Tip;
 use super::badge::badge;
 use super::boxes::hexagon;
-use super::options;
-use super::page::PageFrame;
+use super::{PageFrame, options};
 use crate::base::geometry::{Point, Rect};
 use crate::base::words;
 use crate::draw::scene::{Anchor, Font, Form, Group, Shape, Stroke, Text, line};

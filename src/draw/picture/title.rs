@@ -1,7 +1,6 @@
 //! The bar on top: the changes of the window in words, with its time.
 
-use super::PageOptions;
-use super::page::PageFrame;
+use super::{PageFrame, PageOptions};
 use crate::base::geometry::Point;
 use crate::base::words;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Stroke, Text, line};

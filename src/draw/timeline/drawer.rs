@@ -3,13 +3,12 @@
 
 use super::Timeline;
 use super::canvas::{HAIRLINE, PaperCanvas, Sizes, Type, ink};
+use super::legend::PhaseLabel;
 use super::marks::{RowMark, Sign};
-use super::phases::PhaseLabel;
 use super::rows::{Level, Row, SendingBar};
-use crate::base::cast;
 use crate::base::geometry::{Point, Rect};
 use crate::base::time::{Span, Stamp, round_length};
-use crate::base::words;
+use crate::base::{cast, words};
 use crate::draw::scene::{Form, Group, Shape, Stroke};
 use crate::draw::style::{Color, Style};
 use crate::mission::event_log::Interruption;

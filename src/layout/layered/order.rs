@@ -85,7 +85,7 @@ impl<'a> Search<'a> {
         let edges = self.layers.rank.len();
         let sorter = &mut self.sorter;
         sorter.restart(key);
-        let mut found = (sorter.items().to_vec(), sorter.crossings());
+        let mut found = (sorter.items.clone(), sorter.crossings());
         let mut stalled = 0;
         for sweep in 0..SWEEPS {
             sorter.sweep((sweep % 2 == 0) == downwards, sweep % 4 >= 2);
@@ -94,7 +94,7 @@ impl<'a> Search<'a> {
             let crossings = sorter.crossings();
             stalled += 1;
             if crossings < found.1 {
-                found.0.clone_from_slice(sorter.items());
+                found.0.clone_from_slice(&sorter.items);
                 found.1 = crossings;
                 stalled = 0;
             }
@@ -312,11 +312,6 @@ impl<'a> CrossingReducer<'a> {
         }
     }
 
-    /// The items of all rows, row by row.
-    pub(crate) fn items(&self) -> &[usize] {
-        &self.items
-    }
-
     /// These items as rows.
     pub(crate) fn rows(&self, items: &[usize]) -> LayerRows {
         let rows = 0..self.layers.ranks;
@@ -377,34 +372,25 @@ impl<'a> CrossingReducer<'a> {
         if std::mem::replace(&mut self.sides[side].is_fresh[rank], true) {
             return;
         }
-        let (beside, back) = if side == 0 {
-            (rank.checked_sub(1), &self.layers.down)
-        } else {
-            (
-                Some(rank + 1).filter(|r| *r < self.layers.ranks),
-                &self.layers.up,
-            )
+        let ends = [&self.layers.up, &self.layers.down];
+        let (neighbours, back) = (ends[side], ends[1 - side]);
+        let beside = match side {
+            0 => rank.checked_sub(1),
+            _ => Some(rank + 1).filter(|beside| *beside < self.layers.ranks),
         };
         let Some(beside) = beside else {
             return;
         };
+        let (own, beside) = (self.row(rank), self.row(beside));
         let Side { first, places, .. } = &mut self.sides[side];
         // The start of each item's positions advances to their end and is then reset.
-        for (place, &u) in self.items[self.start[beside]..self.start[beside + 1]]
-            .iter()
-            .enumerate()
-        {
+        for (place, &u) in self.items[beside].iter().enumerate() {
             for &v in &back[u] {
                 places[first[v]] = place;
                 first[v] += 1;
             }
         }
-        let neighbours = if side == 0 {
-            &self.layers.up
-        } else {
-            &self.layers.down
-        };
-        for &v in &self.items[self.start[rank]..self.start[rank + 1]] {
+        for &v in &self.items[own] {
             first[v] -= neighbours[v].len();
         }
     }
@@ -704,36 +690,3 @@ fn extents(layers: &Layers, items: &[usize]) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::layout::LayerItem;
-
-    /// Three layers of two; each item leads to the one diagonally across.
-    fn crossed() -> Layers {
-        let mut layers = Layers {
-            vertices: 6,
-            kind: vec![LayerItem::Vertex; 6],
-            rank: vec![0, 0, 1, 1, 2, 2],
-            home: vec![0; 6],
-            up: vec![Vec::new(); 6],
-            down: vec![Vec::new(); 6],
-            parent: vec![0],
-            ranks: 3,
-            ..Layers::default()
-        };
-        for (from, to) in [(0, 3), (1, 2), (2, 5), (3, 4)] {
-            layers.down[from].push(to);
-            layers.up[to].push(from);
-        }
-        layers
-    }
-
-    #[test]
-    fn avoidable_crossings_are_removed() {
-        let LayerOrder { rows, crossings } = order(&crossed(), 1000);
-        assert_eq!(crossings, 0);
-        assert_eq!(rows.iter().map(Vec::len).collect::<Vec<_>>(), [2, 2, 2]);
-    }
-}

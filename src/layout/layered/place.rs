@@ -235,10 +235,8 @@ impl<'a> Table<'a> {
     /// that keep every gap.
     fn straighten_borders(&mut self) {
         let all = 0..self.items.len();
-        let head: Vec<usize> = all
-            .clone()
-            .filter_map(|at| self.column(at).next())
-            .collect();
+        let heads = all.clone().filter_map(|at| self.column(at).next());
+        let head: Vec<usize> = heads.collect();
         let goal = |at: usize| {
             let sum = self.column(at).fold(0.0, |sum, at| sum + self.across[at]);
             sum / self.column(at).count() as f64
@@ -378,9 +376,8 @@ impl Monotone {
 
     /// The non-decreasing sequence nearest to the goals in weighted squares.
     pub(crate) fn nearest(&self) -> impl Iterator<Item = f64> {
-        self.pools
-            .iter()
-            .flat_map(|pool| std::iter::repeat_n(pool.mean, pool.count))
+        let pools = self.pools.iter();
+        pools.flat_map(|pool| std::iter::repeat_n(pool.mean, pool.count))
     }
 }
 

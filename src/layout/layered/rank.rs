@@ -364,8 +364,6 @@ fn squeezed(rank: &[usize]) -> Vec<usize> {
 mod tests {
     use super::*;
 
-    use super::*;
-
     #[test]
     fn ranks_grow_along_every_edge() {
         let edges = [(0, 1), (1, 2), (0, 2), (3, 2), (3, 4)];
