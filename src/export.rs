@@ -2,8 +2,9 @@
 //!
 //! In comes a [`Sequence`](sequence::Sequence): a mission, its view, and the drawings of its windows; out come files, each whole
 //! or not at all. Open `encoder` first: what a format is. `run` draws each frame once and passes it to every output;
-//! `target` and `sink` are about files; the other files are formats.
+//! `target`, `check` and `sink` are about files; the other files are formats.
 
+pub(crate) mod check;
 pub(crate) mod dot;
 pub(crate) mod encoder;
 mod gif;
@@ -188,10 +189,10 @@ impl Output {
 /// the inputs and other files that are read, which are never overwritten.
 ///
 /// # Errors
-/// As [`target::check`], and [`Error::Output`] if a format's requirements are not met.
+/// As [`check::check`], and [`Error::Output`] if a format's requirements are not met.
 pub(crate) fn check(outputs: &[Output], kept: &[PathBuf]) -> Result<()> {
     let targets: Vec<Target> = outputs.iter().flat_map(files).collect();
-    target::check(&targets, kept)?;
+    check::check(&targets, kept)?;
     outputs
         .iter()
         .try_for_each(|o| o.format.check.map_or(Ok(()), |check| check(&o.target)))

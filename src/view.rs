@@ -3,10 +3,11 @@
 //! In come a mission and [`ViewOptions`]; out comes a [`View`]: boxes, arrows and namespaces, and for each window their looks
 //! and the words for its changes. Open `items` first: it asks `choose` which elements are visible, `fold` which of them are
 //! one box, and `listed` which are only words. `frames` then goes through the windows: `state` says what exists, `marked`
-//! what changes, `caption` puts it into words; `steady` removes flicker between windows.
+//! what changes, `caption` puts it into words; `shown` keeps their looks, without flicker between windows.
 
 mod caption;
 mod choose;
+mod filtered;
 mod fold;
 mod frames;
 mod items;
@@ -24,7 +25,7 @@ use crate::base::ids::ids;
 use crate::base::notice::Notices;
 use crate::graph::{ById, Element};
 use crate::mission::Mission;
-pub(crate) use choose::filtered;
+pub(crate) use filtered::filtered;
 pub use fold::box_rows::BoxRow;
 pub use fold::namespaces::Collapsible;
 pub(crate) use fold::namespaces::{COMMON, headlines};

@@ -12,7 +12,8 @@ use super::scene::{Scene, Stroke};
 use super::text::Fonts;
 use super::timeline::canvas::{HAIRLINE, PX_PER_MM, PaperCanvas, Sizes, Type, ink};
 use super::timeline::drawer::{Density, Drawer, clock};
-use super::timeline::legend::{self, flow, names, sentence};
+use super::timeline::legend;
+use super::timeline::notes::{flow, names, sentence};
 use super::timeline::rows::{self, Row, by_namespace, together};
 use super::timeline::{FigureSource, Timeline};
 use crate::base::cast;
@@ -318,7 +319,7 @@ pub(crate) fn graph(sheet: &FigureSheet<'_>, picture: Scene) -> Scene {
         let drawer = drawer.without_columns(width);
         y = drawer.ground(&mut canvas);
         canvas.begin("words");
-        y = legend::names(&mut canvas, source, width, y);
+        y = names(&mut canvas, source, width, y);
     }
     canvas.begin("notes");
     if !sheet.options.is_bare {

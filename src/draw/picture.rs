@@ -3,8 +3,20 @@
 mod arrows;
 mod badge;
 mod boxes;
+mod gates;
+mod legend;
+mod measured;
+pub(crate) mod options;
+mod room;
+pub(crate) mod spaces;
 mod texts;
-use super::scene::{Group, Scene};
+pub(crate) mod title;
+mod union;
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::scene::{Group, Piece, Scene};
 use super::style::Style;
 use super::text::Fonts;
 use super::timeline::Timeline;
@@ -17,20 +29,13 @@ use arrows::ArrowPath;
 use boxes::ItemBox;
 use gates::Gate;
 pub(crate) use legend::{LegendSign, signs};
-use measured::MeasuredGraph;
+use measured::{MeasuredGraph, find};
 use options::Spotlight;
 pub use texts::unshown;
 use texts::{arrow_id, encoded, item_id};
 pub(crate) use texts::{change_counts, short_name};
 use title::Title;
 pub use union::{Union, UnionElement, rate_label, sign};
-mod gates;
-mod legend;
-mod measured;
-pub(crate) mod options;
-pub(crate) mod spaces;
-pub(crate) mod title;
-mod union;
 
 /// The user's options of the picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -367,13 +372,8 @@ impl Picture<'_> {
             .clone()
             .filter_map(|(item, card, shown)| pen.glow(item, card, shown));
         // Lines do not cross words.
-        groups.extend(
-            glows
-                .chain(line_glows)
-                .chain(lines)
-                .chain(titles)
-                .chain(labels),
-        );
+        groups.extend(glows.chain(line_glows).chain(lines));
+        groups.extend(titles.into_iter().chain(labels));
         for (item, card, shown) in items {
             let mut drawn = pen.item(item, card, shown);
             if let Some(presence) = view.presences.get(shown.item()) {
@@ -382,15 +382,67 @@ impl Picture<'_> {
             let rows = card.card.iter();
             let rows = rows.flat_map(|rows| pen.card_rows(rows, &card.id, card.place, view, k));
             let all = std::iter::once(drawn).chain(rows);
-            if spotlight
-                .as_ref()
-                .is_none_or(|spot| spot.lit.contains(&shown.item()))
-            {
+            let is_lit = |spot: &Spotlight<'_>| spot.lit.contains(&shown.item());
+            if spotlight.as_ref().is_none_or(is_lit) {
                 groups.extend(all);
             } else {
                 groups.extend(all.map(pale));
             }
         }
+    }
+
+    /// The lines of a window, those of a namespace merged while they are unchanged, with one label for each fork: the glows,
+    /// which cover no head of another, the lines, and their labels; changed ones last, so that they are on top.
+    fn lines(&self, seen: &SeenWindow, spotlight: Option<&Spotlight<'_>>) -> [Vec<Group>; 3] {
+        let measured = &self.measured;
+        let links = &measured.graph.plan.links;
+        let look = |id: ArrowId| find(&seen.arrows, id.at());
+        let mut drawn = Vec::new();
+        let mut in_gates = BTreeSet::new();
+        for (gate, path) in &self.gates {
+            if let Some((shown, lines)) = gate.shown(measured.view, look) {
+                in_gates.extend(lines);
+                drawn.push((
+                    &gate.arrow,
+                    path,
+                    Cow::Owned(shown),
+                    links[gate.lead.at()].fork,
+                ));
+            }
+        }
+        for &id in self.order.iter().filter(|id| !in_gates.contains(id)) {
+            let (arrow, path) = (&measured.view.arrows[id], &self.tracks[id.at()]);
+            if let Some(shown) = look(id) {
+                drawn.push((arrow, path, Cow::Borrowed(shown), links[id.at()].fork));
+            }
+        }
+        drawn.sort_by_key(|(.., shown, _)| shown.mark.is_some());
+        // The lines of a fork have one label: that of a line that changed, which is on top.
+        let mut last: BTreeMap<usize, usize> = BTreeMap::new();
+        for (k, (.., fork)) in drawn.iter().enumerate() {
+            last.extend(fork.map(|fork| (fork, k)));
+        }
+        let pen = self.pen();
+        let mut groups = [(); 3].map(|()| Vec::new());
+        for (arrow, path, shown, fork) in &drawn {
+            let ends = [arrow.from, arrow.to].map(|id| find(&seen.items, id.at()));
+            let mut parts = pen.arrow_parts(arrow, path, shown, ends);
+            let spot = spotlight.filter(|spot| !spot.has_line(arrow, shown));
+            for part in &mut parts {
+                spot.inspect(|spot| spot.pale(part));
+            }
+            let named = fork.and_then(|fork| last.get(&fork)).map(|at| drawn[*at].1);
+            if named.is_some_and(|other| {
+                !std::ptr::eq(other, *path) && other.label_area() == path.label_area()
+            }) {
+                let label = &mut parts[2].pieces;
+                label.retain(|piece| !matches!(piece, Piece::Text(_)));
+            }
+            for (group, part) in groups.iter_mut().zip(parts) {
+                group.extend(Some(part).filter(|part| !part.pieces.is_empty()));
+            }
+        }
+        groups
     }
 
     fn pen(&self) -> GraphPen<'_> {
@@ -418,10 +470,10 @@ fn places(
         (fit.rect(*frame), title, has_footer)
     });
     let titles: Vec<_> = titles.collect();
-    let (shifts, titles) = badge::place_titles(&titles, &cards, &tracks, fit.scale)
+    let (shifts, titles) = room::place_titles(&titles, &cards, &tracks, fit.scale)
         .into_iter()
         .unzip();
-    badge::place_badges(&mut cards, &mut tracks, titles, radius, fit.scale);
+    room::place_badges(&mut cards, &mut tracks, titles, radius, fit.scale);
     (cards, tracks, shifts)
 }
 
@@ -534,12 +586,8 @@ impl PageFrame {
         let bottom = (size.h - legend - timeline).max(top + 1.0);
         // The title's bar separates already.
         let above = if options.bare { margin } else { margin / 4.0 };
-        let graph = Rect::new(
-            margin,
-            top + above,
-            size.w - 2.0 * margin,
-            bottom - top - above - margin,
-        );
+        let high = bottom - top - above - margin;
+        let graph = Rect::new(margin, top + above, size.w - 2.0 * margin, high);
         Self {
             size,
             unit,

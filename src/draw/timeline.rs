@@ -11,6 +11,7 @@ pub(crate) mod canvas;
 pub(crate) mod drawer;
 pub(crate) mod legend;
 pub(crate) mod marks;
+pub(crate) mod notes;
 pub(crate) mod rows;
 
 use std::collections::BTreeMap;
@@ -24,8 +25,8 @@ use crate::mission::Mission;
 use crate::mission::event_log::{Interruption, Phase};
 use crate::mission::phases::knows_publishers;
 use crate::view::NameFilter;
-use legend::PhaseLabel;
 use marks::RowMark;
+use notes::PhaseLabel;
 use rows::Row;
 
 /// Rows over time, in the order in which they are drawn.
@@ -46,7 +47,7 @@ impl Timeline {
     pub(crate) fn new(source: &FigureSource<'_>, rows: Vec<Row>) -> Self {
         Self {
             span: source.span(),
-            phases: legend::numbered(source),
+            phases: notes::numbered(source),
             interruptions: source.mission.log.interruptions.clone(),
             rows,
         }
@@ -55,7 +56,7 @@ impl Timeline {
     /// These rows with named phases.
     pub(crate) fn named(source: &FigureSource<'_>, rows: Vec<Row>) -> Self {
         Self {
-            phases: legend::named(source),
+            phases: notes::named(source),
             ..Self::new(source, rows)
         }
     }

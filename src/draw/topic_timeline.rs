@@ -180,11 +180,7 @@ impl<'a> TopicTimeline<'a> {
         canvas.begin("why");
         let wide = self.options.size.w / self.scale - 2.0 * self.drawer.left;
         let why = self.why();
-        let window = if is_window {
-            "; frame: this window"
-        } else {
-            ""
-        };
+        let window = ["", "; frame: this window"][usize::from(is_window)];
         let signs = format!("{why}. Tick: first message; cross: last{window}.");
         let fits = canvas.width(&signs, Type::Small) <= wide;
         let why = canvas.cut(if fits { &signs } else { why }, Type::Small, wide);

@@ -150,11 +150,7 @@ impl HtmlPage<'_> {
             digest::policy(&fonts),
             digest::policy(&look),
         );
-        let schemes = if self.dark.is_some() {
-            "light dark"
-        } else {
-            "normal"
-        };
+        let schemes = self.dark.map_or("normal", |_| "light dark");
         let view = self.whole.view;
         let is_paired = self.sequence.options.pairs.is_some();
         let kind = match self.overview {
@@ -536,14 +532,8 @@ impl PageChanges {
             let text = format!("{name} is back after {}", words::duration(away));
             let when = words::offset_tenths(mission.offset(end));
             let at = secs(frame, end);
-            Some(ChangeLine(
-                at,
-                2,
-                place(&last.what),
-                text,
-                Some(last.event),
-                when,
-            ))
+            let (place, event) = (place(&last.what), Some(last.event));
+            Some(ChangeLine(at, 2, place, text, event, when))
         };
         let line = |frame: &Frame, headline: &Headline| {
             let (event, line) = said.get(&headline.event)?;
@@ -626,10 +616,8 @@ impl PageChanges {
             return String::new();
         }
         xml.open("details").attribute("open", "");
-        xml.leaf(
-            "summary",
-            ["All changes", "Differences"][usize::from(compares)],
-        );
+        let summary = ["All changes", "Differences"][usize::from(compares)];
+        xml.leaf("summary", summary);
         if lines.len() > MOST_ROWS {
             let text = format!("The first {MOST_ROWS} of {}:", lines.len());
             xml.leaf("p", &text);

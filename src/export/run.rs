@@ -7,9 +7,9 @@ use std::{io, thread};
 
 use rayon::prelude::*;
 
+use super::check::make_folder;
 use super::palette::{Census, Matcher, Palette};
 use super::sequence::{FrameTime, Sequence, SequenceOptions};
-use super::target::make_folder;
 use super::{DrawnFrame, Encoder, Needs, Output, Pack, Packet, Written};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;

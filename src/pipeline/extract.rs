@@ -17,8 +17,9 @@ use crate::base::name::TopicName;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::{Moment, Span};
 use crate::evidence::clock;
+use crate::export::check::{check, check_folder, make_folder};
 use crate::export::tables::TableFormat;
-use crate::export::target::{Target, check, check_folder, make_folder};
+use crate::export::target::Target;
 use crate::graph::window::{self, Division};
 use crate::view::{NameFilter, unmatched_topics};
 

@@ -15,7 +15,7 @@ use crate::draw::scene::Scene;
 use crate::draw::timeline::FigureSource;
 use crate::draw::timeline::canvas::PX_PER_MM;
 use crate::draw::timeline::drawer::clock;
-use crate::draw::timeline::legend::title;
+use crate::draw::timeline::notes::title;
 use crate::export::Output;
 use crate::export::sequence::FigureOptions;
 use crate::graph::Element;

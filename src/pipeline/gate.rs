@@ -12,8 +12,9 @@ use crate::base::notice::NoticeKind;
 use crate::base::time::Period;
 use crate::base::{budget, file, words};
 use crate::export::Output;
+use crate::export::check::{check as check_targets, make_folder};
 use crate::export::sink::write_file;
-use crate::export::target::{Target, check as check_targets, make_folder};
+use crate::export::target::Target;
 use crate::gate::{
     DiffSubject, Difference, Expectation, ReportFormat, Runs, Side, Subject, Verdict, differences,
     judge, pairs, unchecked, union, update, write,

@@ -15,9 +15,10 @@ use crate::bag::{Recording, written};
 use crate::base::error::{Error, Result};
 use crate::base::file::with_suffix;
 use crate::base::notice::{Notice, NoticeKind, Notices};
+use crate::export::check::make_folder;
 use crate::export::sink::write_file;
 use crate::export::tables::{self, TableFormat};
-use crate::export::target::{Target, make_folder, resolved};
+use crate::export::target::{Target, resolved};
 pub use count::{Counted, Counting, count};
 
 /// The whole job of `bagreel tables`.

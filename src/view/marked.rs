@@ -565,9 +565,7 @@ impl View {
             left_out,
         })
     }
-}
 
-impl View {
     /// The view with the rates that changed, but no others, for narrow drawings.
     pub(crate) fn without_rates(&self) -> Self {
         let unrated = |looks: &ShownRuns| {

@@ -6,7 +6,7 @@ use crate::base::words;
 use crate::draw::scene::{Scene, Stroke};
 use crate::draw::style::Color;
 use crate::draw::timeline::canvas::{HAIRLINE, PX_PER_MM, PaperCanvas, Type, ink};
-use crate::draw::timeline::legend::{Unbroken, flow, flow_at, sentence};
+use crate::draw::timeline::notes::{Unbroken, flow, flow_at, sentence};
 use crate::mission::EventId;
 
 /// The space between two panels, inside their borders, and between the head of a panel and its graph, in millimetres: what

@@ -6,7 +6,7 @@ use super::{FigureKind, FigureOptions};
 use crate::base::words;
 use crate::draw::timeline::FigureSource;
 use crate::draw::timeline::drawer::clock;
-use crate::draw::timeline::legend::title;
+use crate::draw::timeline::notes::title;
 
 /// The caption: the content, the phases with their times, bag and length, the legend in words.
 pub(crate) fn caption(

@@ -1,18 +1,14 @@
-//! Publications and subscriptions: their routes, rates and signs of change, and the lines of a window.
+//! Publications and subscriptions: their routes, rates and signs of change.
 
-use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet};
-
-use super::options::{self, ArrowLook, Spotlight};
+use super::options::{self, ArrowLook};
 use super::texts::{self, LINE, arrow_label, class, reported};
-use super::{GraphFit, GraphPen, Picture, badge, measured};
+use super::{GraphFit, GraphPen, badge};
 use crate::base::geometry::{Point, Rect, Size, after, on_cubic, polyline};
-use crate::draw::scene::{Anchor, Font, Form, Group, Piece, Shape, Step, Stroke, Text, polygon};
+use crate::draw::scene::{Anchor, Font, Form, Group, Shape, Step, Stroke, Text, polygon};
 use crate::draw::style::Color;
 use crate::draw::text::Weight;
-use crate::graph::Id as _;
 use crate::layout::Route;
-use crate::view::{Arrow, ArrowId, ArrowKind, Mark, SeenWindow, Shown};
+use crate::view::{Arrow, ArrowKind, Mark, Shown};
 
 /// The number of straight pieces in which a curve is measured: with ten, its length is exact to a hundredth.
 const PIECES: u32 = 10;
@@ -271,11 +267,8 @@ impl GraphPen<'_> {
         };
         let (mut start, mut curves) = (track.route.start, track.route.curves.clone());
         if let Some(end) = curves.last_mut().filter(|_| heads[0]) {
-            *end = [
-                end[0],
-                back(end[1], along, short * 0.5),
-                back(end[2], along, short),
-            ];
+            end[1] = back(end[1], along, short * 0.5);
+            end[2] = back(end[2], along, short);
         }
         if let Some(end) = curves.first_mut().filter(|_| heads[1]) {
             start = back(start, against, short);
@@ -291,19 +284,14 @@ impl GraphPen<'_> {
         }
         group.shape(Shape::line(path, stroke));
         let tips = [(end, along), (track.route.start, against)];
-        for (tip, along) in tips
-            .into_iter()
-            .zip(heads)
-            .filter_map(|(tip, is)| is.then_some(tip))
-        {
+        let tips = tips.into_iter().zip(heads);
+        for (tip, along) in tips.filter_map(|(tip, is)| is.then_some(tip)) {
             group.shape(Shape::filled(kind.form(tip, along, head), color));
         }
         if look.dot {
             let dot = Size::new(5.0 * scale, 5.0 * scale);
-            group.shape(Shape::filled(
-                Form::Ellipse(Rect::around(track.route.start, dot)),
-                color,
-            ));
+            let dot = Form::Ellipse(Rect::around(track.route.start, dot));
+            group.shape(Shape::filled(dot, color));
         }
     }
 
@@ -311,10 +299,8 @@ impl GraphPen<'_> {
     fn rows(&self, group: &mut Group, track: &ArrowPath, shown: &Shown, look: &ArrowLook) {
         let Some(place) = track.label else { return };
         let style = &self.style.edge;
-        let (size, halo) = (
-            style.size * self.fit.scale,
-            style.halo_width * self.fit.scale,
-        );
+        let scale = self.fit.scale;
+        let (size, halo) = (style.size * scale, style.halo_width * scale);
         let rows = texts::rows(shown, &track.topics);
         let edge = place.middle(halo);
         let middle = rows.len() as f64 / 2.0 - 0.5;
@@ -426,66 +412,4 @@ fn at_part(points: &[Point], length: f64, part: f64) -> Point {
         left -= step;
     }
     points.last().copied().unwrap_or_default()
-}
-
-// The lines of a window: those of a namespace merged while they are unchanged, and one label for each fork.
-
-impl Picture<'_> {
-    /// The glows of the lines of a window, which cover no head of another, the lines, and their labels; changed ones last, so
-    /// that they are on top.
-    pub(super) fn lines(
-        &self,
-        seen: &SeenWindow,
-        spotlight: Option<&Spotlight<'_>>,
-    ) -> [Vec<Group>; 3] {
-        let measured = &self.measured;
-        let links = &measured.graph.plan.links;
-        let look = |id: ArrowId| measured::find(&seen.arrows, id.at());
-        let mut drawn = Vec::new();
-        let mut in_gates = BTreeSet::new();
-        for (gate, path) in &self.gates {
-            if let Some((shown, lines)) = gate.shown(measured.view, look) {
-                in_gates.extend(lines);
-                drawn.push((
-                    &gate.arrow,
-                    path,
-                    Cow::Owned(shown),
-                    links[gate.lead.at()].fork,
-                ));
-            }
-        }
-        for &id in self.order.iter().filter(|id| !in_gates.contains(id)) {
-            let (arrow, path) = (&measured.view.arrows[id], &self.tracks[id.at()]);
-            if let Some(shown) = look(id) {
-                drawn.push((arrow, path, Cow::Borrowed(shown), links[id.at()].fork));
-            }
-        }
-        drawn.sort_by_key(|(.., shown, _)| shown.mark.is_some());
-        // The lines of a fork have one label: that of a line that changed, which is on top.
-        let mut last: BTreeMap<usize, usize> = BTreeMap::new();
-        for (k, (.., fork)) in drawn.iter().enumerate() {
-            last.extend(fork.map(|fork| (fork, k)));
-        }
-        let pen = self.pen();
-        let mut groups = [(); 3].map(|()| Vec::new());
-        for (arrow, path, shown, fork) in &drawn {
-            let ends = [arrow.from, arrow.to].map(|id| measured::find(&seen.items, id.at()));
-            let mut parts = pen.arrow_parts(arrow, path, shown, ends);
-            let spot = spotlight.filter(|spot| !spot.has_line(arrow, shown));
-            for part in &mut parts {
-                spot.inspect(|spot| spot.pale(part));
-            }
-            let named = fork.and_then(|fork| last.get(&fork)).map(|at| drawn[*at].1);
-            if named.is_some_and(|other| {
-                !std::ptr::eq(other, *path) && other.label_area() == path.label_area()
-            }) {
-                let label = &mut parts[2].pieces;
-                label.retain(|piece| !matches!(piece, Piece::Text(_)));
-            }
-            for (group, part) in groups.iter_mut().zip(parts) {
-                group.extend(Some(part).filter(|part| !part.pieces.is_empty()));
-            }
-        }
-        groups
-    }
 }

@@ -114,10 +114,8 @@ impl GraphPen<'_> {
     /// and within the gap between boxes.
     fn below(&self, place: Rect) -> (Point, f64) {
         let size = self.style.edge.size * self.fit.scale * 0.95;
-        (
-            Point::new(place.centre().x, place.bottom() + size * 0.2),
-            size,
-        )
+        let middle = Point::new(place.centre().x, place.bottom() + size * 0.2);
+        (middle, size)
     }
 
     /// The text of the rate label of a box, without its outline.
@@ -199,12 +197,8 @@ impl GraphPen<'_> {
     fn latch_bar(&self, place: Rect, body: &Body) -> Form {
         let width = self.style.latched.bar * self.fit.scale;
         let inset = body.width * self.fit.pen / 2.0;
-        let bar = Rect::new(
-            place.x + inset,
-            place.y + inset,
-            width,
-            place.h - 2.0 * inset,
-        );
+        let high = place.h - 2.0 * inset;
+        let bar = Rect::new(place.x + inset, place.y + inset, width, high);
         Form::Rect(bar, 0.0)
     }
 
@@ -283,12 +277,8 @@ impl GraphPen<'_> {
         let aside = if body.is_capsule() { 0.85 } else { 1.0 } * body.pad_x * scale;
         // Below the name and the smaller line, where `GraphPen::lines` leaves room.
         let middle = place.centre().y + card.label.lines(body) / 2.0 * scale;
-        let bar = Rect::new(
-            place.x + aside,
-            middle - high / 2.0,
-            (place.w - 2.0 * aside).max(1.0),
-            high,
-        );
+        let wide = (place.w - 2.0 * aside).max(1.0);
+        let bar = Rect::new(place.x + aside, middle - high / 2.0, wide, high);
         group.shape(Shape::filled(Form::Rect(bar, 0.0), style.timeline.future));
         for (from, to) in &presence.times {
             // At least half a pixel, or a short presence is not seen.

@@ -91,12 +91,8 @@ impl GraphPen<'_> {
         let size = self.style.cluster.size;
         let (place, scale) = (self.fit.rect(place).moved(by), self.fit.scale);
         let area = |(x, width): (f64, f64)| {
-            Rect::new(
-                place.x + (8.0 + x) * scale,
-                place.y + 3.0 * scale,
-                width * scale,
-                size * 1.15 * scale,
-            )
+            let (x, y) = (place.x + (8.0 + x) * scale, place.y + 3.0 * scale);
+            Rect::new(x, y, width * scale, size * 1.15 * scale)
         };
         let here = who.iter().filter(|who| who.is_here());
         let mut group = Group::new(format!("s{id}..members"), "members")

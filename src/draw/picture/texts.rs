@@ -469,10 +469,8 @@ impl Row {
 pub(crate) fn names(view: &View, arrow: &Arrow) -> Vec<String> {
     let plain = |name: &Arc<str>| {
         let family = FAMILIES.iter().find_map(|end| name.strip_suffix(end));
-        family
-            .filter(|rest| !rest.is_empty())
-            .unwrap_or(name)
-            .to_owned()
+        let rest = family.filter(|rest| !rest.is_empty());
+        rest.unwrap_or(name).to_owned()
     };
     let plain: Vec<String> = arrow.topics.iter().map(plain).collect();
     let forms: Vec<[&str; 3]> = arrow
@@ -523,11 +521,8 @@ pub(crate) fn rows(shown: &Shown, names: &[String]) -> Vec<Row> {
     let both = shown.ways() == [true, true];
     let changed = shown.topics.iter().filter(|row| row.mark.is_some()).count();
     let all = shown.topics.len();
-    let most = if all <= MOST {
-        all
-    } else {
-        changed.clamp(1, MOST)
-    };
+    let few = changed.clamp(1, MOST);
+    let most = if all <= MOST { all } else { few };
     let is_whole = shown.is_ghost();
     let mut rows: Vec<Row> = Vec::new();
     for row in shown.by_rate().take(most) {
@@ -546,11 +541,8 @@ pub(crate) fn rows(shown: &Shown, names: &[String]) -> Vec<Row> {
             Some(rate) if is_split => (name.to_owned(), Some(rate)),
             Some(rate) => (format!("{name} {rate}"), None),
         };
-        let ways = if both || row.ways == [true, true] {
-            row.ways
-        } else {
-            [false, false]
-        };
+        let has_signs = both || row.ways == [true, true];
+        let ways = if has_signs { row.ways } else { [false; 2] };
         rows.push(Row {
             ways,
             text,

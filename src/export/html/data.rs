@@ -167,23 +167,20 @@ fn graph<'a>(
         };
         (arrow.from.0, arrow.to.0, carried)
     };
+    let names = view
+        .items
+        .iter()
+        .map(|item| visible(&item.name).into_owned());
+    let of_lines = drawn.order.iter().map(|id| &runs.arrows[id.at()]);
     GraphData {
         facts: facts.collect(),
-        names: view
-            .items
-            .iter()
-            .map(|i| visible(&i.name).into_owned())
-            .collect(),
+        names: names.collect(),
         kinds: view.items.iter().map(|i| i.kind as u8).collect(),
         boxes: drawn.union.items.iter().map(|p| rounded(p.rect)).collect(),
         arrows: order().map(arrow).collect(),
         classes: &runs.classes,
         labels: &runs.labels,
-        runs: runs
-            .items
-            .iter()
-            .chain(drawn.order.iter().map(|id| &runs.arrows[id.at()]))
-            .collect(),
+        runs: runs.items.iter().chain(of_lines).collect(),
         members: if std::ptr::eq(drawn, &raw const page.whole) {
             Vec::new()
         } else {
@@ -452,10 +449,8 @@ impl ViewRuns {
 
     /// All class words that occur.
     pub(crate) fn words(&self) -> BTreeSet<&str> {
-        self.classes
-            .iter()
-            .flat_map(|class| class.split(' '))
-            .collect()
+        let classes = self.classes.iter();
+        classes.flat_map(|class| class.split(' ')).collect()
     }
 }
 
@@ -577,10 +572,8 @@ impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
                 let value = self.labels.place(words::rates(&shown.steps));
                 life.turns.0.push((window, value));
             }
-            let members = shown
-                .members
-                .number()
-                .map(|(n, word)| words::count(n, word));
+            let members = shown.members.number();
+            let members = members.map(|(n, word)| words::count(n, word));
             let lifecycle = shown.lifecycle.as_deref().or(members.as_deref());
             let lifecycle = lifecycle.unwrap_or_default();
             if !lifecycle.is_empty() || !life.lifecycles.0.is_empty() {
