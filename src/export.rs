@@ -4,7 +4,6 @@
 //! or not at all. Open `encoder` first: what a format is. `run` draws each frame once and passes it to every output;
 //! `target`, `check` and `sink` are about files; the other files are formats.
 
-mod animated_svg;
 pub(crate) mod check;
 pub(crate) mod dot;
 pub(crate) mod encoder;
@@ -13,7 +12,6 @@ pub(crate) mod html;
 mod json;
 pub(crate) mod markdown;
 pub(crate) mod mermaid;
-pub mod options;
 pub(crate) mod palette;
 #[cfg(feature = "parquet")]
 pub(crate) mod parquet;
@@ -39,7 +37,6 @@ pub use encoder::Written;
 use encoder::{DATA, GRAPH, IMAGE, LOOK, PICTURE, WORDS};
 pub use encoder::{DrawnFrame, Encoder, Needs, OneDrawing, OutputFormat, Packet};
 pub(crate) use encoder::{Started, at_end, one_file, one_text, text_per_window};
-use sequence::Shows;
 use tables::TableFormat;
 use target::Target;
 pub(crate) use tex::needs_figure;
@@ -56,10 +53,7 @@ pub const FORMATS: &[OutputFormat] = &[
     OutputFormat {
         word: "svg",
         what: "a drawing per window with `{n}`, otherwise an animation",
-        start: |sequence, target| match sequence.shows(target, OneDrawing::Asked) {
-            Shows::Film => animated_svg::start(sequence, target),
-            shows => Ok(still::start(sequence, target, StillKind::Svg, shows)),
-        },
+        start: |sequence, target| still::start(sequence, target, StillKind::Svg),
         whole: OneDrawing::Asked,
         takes_together: "frame-ms strip",
         ..IMAGE
@@ -67,19 +61,13 @@ pub const FORMATS: &[OutputFormat] = &[
     OutputFormat {
         word: "png",
         what: "an image per window with `{n}`, otherwise a film strip",
-        start: |sequence, target| {
-            let shows = sequence.shows(target, OneDrawing::Always);
-            Ok(still::start(sequence, target, StillKind::Png, shows))
-        },
+        start: |sequence, target| still::start(sequence, target, StillKind::Png),
         ..IMAGE
     },
     OutputFormat {
         word: "webp",
         what: "an image per window with `{n}`, otherwise a film strip",
-        start: |sequence, target| {
-            let shows = sequence.shows(target, OneDrawing::Always);
-            Ok(still::start(sequence, target, StillKind::WebP, shows))
-        },
+        start: |sequence, target| still::start(sequence, target, StillKind::WebP),
         ..IMAGE
     },
     OutputFormat {

@@ -66,7 +66,7 @@ pub mod export {
     pub use crate::export::tables::TableFormat;
     pub use crate::export::{
         DrawnFrame, Encoder, FORMATS, Needs, OneDrawing, Output, OutputFormat, Packet, Written,
-        options, run, sequence,
+        run, sequence,
     };
 }
 

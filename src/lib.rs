@@ -154,7 +154,7 @@ pub mod values {
         draw::style::Color,
         draw::text::{Fonts, Weight},
         export::Written,
-        export::options::SequenceOptions,
+        export::sequence::SequenceOptions,
         export::tables::TableFormat,
         export::target::Target,
         gate::{

@@ -3,7 +3,7 @@
 //! In come a mission and [`ViewOptions`]; out comes a [`View`]: boxes, arrows and namespaces, and for each window their looks
 //! and the words for its changes. Open `items` first: it asks `choose` which elements are visible, `fold` which of them are
 //! one box, and `listed` which are only words. `frames` then goes through the windows: `state` says what exists, `marked`
-//! what changes, `caption` puts it into words; `steady` removes flicker between windows.
+//! what changes, `caption` puts it into words; `shown` keeps their looks, without flicker between windows.
 
 mod caption;
 mod choose;
@@ -12,13 +12,11 @@ mod fold;
 mod frames;
 mod items;
 mod listed;
-mod marked;
-pub(crate) mod news;
+pub(crate) mod marked;
 mod omitted;
 mod options;
 mod shown;
 mod state;
-mod steady;
 mod still;
 
 use std::sync::Arc;
@@ -27,12 +25,10 @@ use crate::base::ids::ids;
 use crate::base::notice::Notices;
 use crate::graph::{ById, Element};
 use crate::mission::Mission;
-
 pub(crate) use filtered::filtered;
 pub use fold::box_rows::BoxRow;
-pub(crate) use fold::namespaces::COMMON;
 pub use fold::namespaces::Collapsible;
-pub(crate) use fold::namespaces::headlines;
+pub(crate) use fold::namespaces::{COMMON, headlines};
 pub(crate) use frames::{BETWEEN_PHRASES, Words, joined};
 pub use frames::{Frame, Headline, Phrase};
 pub(crate) use listed::{DrawnPart, drawn_part};

@@ -14,7 +14,7 @@ use super::values::{one_of, points, width};
 use crate::base::error::{Error, Result};
 use crate::base::notice::NoticeKind;
 use crate::draw::figure::{FigureKind, RowKind};
-use crate::export::options::FigureOptions;
+use crate::export::sequence::FigureOptions;
 use crate::pipeline::Render;
 use crate::view::NameFilter;
 

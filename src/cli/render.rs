@@ -19,7 +19,7 @@ use crate::base::{budget, file};
 use crate::draw::picture::PageOptions;
 use crate::draw::style::{BUILTIN, Style};
 use crate::draw::text::Fonts;
-use crate::export::options::{self, SequenceOptions};
+use crate::export::sequence::{self, SequenceOptions};
 use crate::export::target::Target;
 use crate::export::{FORMATS, Output};
 use crate::graph::window::Length;
@@ -379,7 +379,7 @@ fn page(args: &LookArgs, rate_change: f64) -> PageOptions {
 }
 
 fn sequence(args: &SequenceArgs) -> Result<SequenceOptions> {
-    let strip = args.strip.as_deref().map(options::Choice::parse);
+    let strip = args.strip.as_deref().map(sequence::Choice::parse);
     Ok(SequenceOptions {
         frame_ms: args.frame_ms,
         max_bytes: args.max_bytes,

@@ -1,48 +1,41 @@
 //! The picture: a view, a layout and a style become one scene per window, with fixed positions.
 
-pub(crate) mod also;
 mod arrows;
 mod badge;
 mod boxes;
-mod card;
-mod texts;
-pub(crate) use texts::{change_counts, short_name};
 mod gates;
-mod ids;
 mod legend;
-mod lines;
-pub(crate) use legend::{LegendSign, signs};
 mod measured;
 pub(crate) mod options;
-pub(crate) mod page;
-mod presence_bar;
 mod room;
-mod spaces;
-mod spotlight;
+pub(crate) mod spaces;
+mod texts;
 pub(crate) mod title;
-mod topics;
 mod union;
-mod words;
 
-use self::arrows::ArrowPath;
-use self::boxes::ItemBox;
-use self::gates::Gate;
-pub use self::ids::unshown;
-use self::ids::{arrow_id, encoded, item_id};
-use self::measured::MeasuredGraph;
-use self::page::{GraphFit, GraphPen, PageFrame, Strip};
-use self::spotlight::Spotlight;
-use self::title::Title;
-pub use self::union::{Union, UnionElement, rate_label, sign};
-use crate::base::geometry::{Point, Size};
-use crate::draw::scene::{Group, Scene};
-use crate::draw::style::Style;
-use crate::draw::text::Fonts;
-use crate::draw::timeline::Timeline;
-use crate::draw::timeline::below::Below;
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::scene::{Group, Piece, Scene};
+use super::style::Style;
+use super::text::Fonts;
+use super::timeline::Timeline;
+use super::timeline::below::{Below, BelowSizes};
+use crate::base::geometry::{Point, Rect, Size};
 use crate::graph::Id as _;
 use crate::layout::{self, Layout, Orientation, Plan};
 use crate::view::{ArrowId, ArrowKind, Frame, ItemId, SeenWindow, View};
+use arrows::ArrowPath;
+use boxes::ItemBox;
+use gates::Gate;
+pub(crate) use legend::{LegendSign, signs};
+use measured::{MeasuredGraph, find};
+use options::Spotlight;
+pub use texts::unshown;
+use texts::{arrow_id, encoded, item_id};
+pub(crate) use texts::{change_counts, short_name};
+use title::Title;
+pub use union::{Union, UnionElement, rate_label, sign};
 
 /// The user's options of the picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -123,7 +116,7 @@ impl<'a> Measured<'a> {
     pub fn new(view: &'a View, style: &'a Style, fonts: &'a Fonts, options: PageOptions) -> Self {
         let graph = MeasuredGraph::new(view, style, fonts);
         let signs = legend::signs(view, options.rate_change);
-        let unit = page::unit(&options);
+        let unit = unit(&options);
         let legend = if options.has_legend {
             legend::rows(&signs, style, fonts, unit, options.size.w)
         } else {
@@ -180,7 +173,44 @@ impl<'a> Measured<'a> {
 
     /// The picture with this layout, which must be one of [`Measured::plan`].
     pub fn with(self, layout: Layout) -> Picture<'a> {
-        Picture::new(self, layout)
+        let (view, style, fonts, page) = (self.view, self.style, self.fonts, &self.page);
+        let fit = page.fit(layout.size);
+        let (cards, tracks, shifts) = places(&self, &layout, fit);
+        let mut order: Vec<ArrowId> = view.arrows.ids().collect();
+        let is_publish = |id: ArrowId| view.arrows[id].kind == ArrowKind::Publish;
+        order.sort_by(|&a, &b| {
+            let length = tracks[b.at()].length.total_cmp(&tracks[a.at()].length);
+            is_publish(a)
+                .cmp(&is_publish(b))
+                .then(length)
+                .then(a.cmp(&b))
+        });
+        let gates = self.graph.gates.iter().filter_map(|(gate, names)| {
+            let mut path = gate.path(view, &tracks[gate.lead.at()], &layout, fit)?;
+            path.topics.clone_from(names);
+            Some((gate.clone(), path))
+        });
+        let mut picture = Picture {
+            gates: gates.collect(),
+            shifts,
+            cards,
+            tracks,
+            order,
+            title: Title::new(style, fonts, page, view, &self.options),
+            timeline: Below::new(
+                below(style, &self.options, self.options.strip(view)),
+                fonts,
+                page.timeline,
+                view,
+                self.options.timeline.clone(),
+            ),
+            ground: Vec::new(),
+            measured: self,
+            layout,
+            fit,
+        };
+        picture.ground = picture.ground();
+        picture
     }
 }
 
@@ -204,54 +234,7 @@ pub struct Picture<'a> {
     ground: Vec<Group>,
 }
 
-impl<'a> Picture<'a> {
-    fn new(measured: Measured<'a>, layout: Layout) -> Self {
-        let Measured {
-            view,
-            style,
-            fonts,
-            page,
-            ..
-        } = &measured;
-        let fit = page.fit(layout.size);
-        let (cards, tracks, shifts) = places(&measured, &layout, fit);
-        let mut order: Vec<ArrowId> = view.arrows.ids().collect();
-        let is_publish = |id: ArrowId| view.arrows[id].kind == ArrowKind::Publish;
-        order.sort_by(|&a, &b| {
-            let length = tracks[b.at()].length.total_cmp(&tracks[a.at()].length);
-            is_publish(a)
-                .cmp(&is_publish(b))
-                .then(length)
-                .then(a.cmp(&b))
-        });
-        let gates = measured.graph.gates.iter().filter_map(|(gate, names)| {
-            let mut path = gate.path(view, &tracks[gate.lead.at()], &layout, fit)?;
-            path.topics.clone_from(names);
-            Some((gate.clone(), path))
-        });
-        let mut picture = Self {
-            gates: gates.collect(),
-            shifts,
-            cards,
-            tracks,
-            order,
-            title: Title::new(style, fonts, page, view, &measured.options),
-            timeline: Below::new(
-                page::below(style, &measured.options, measured.options.strip(view)),
-                fonts,
-                page.timeline,
-                view,
-                measured.options.timeline.clone(),
-            ),
-            ground: Vec::new(),
-            measured,
-            layout,
-            fit,
-        };
-        picture.ground = picture.ground();
-        picture
-    }
-
+impl Picture<'_> {
     /// The number of frames: one per window.
     pub fn len(&self) -> usize {
         self.measured.view.frames.len()
@@ -377,7 +360,7 @@ impl<'a> Picture<'a> {
                 None => self.layout.boxes.get(view.items.len()),
             };
             let words = place.and_then(|place| pen.footer(footer, also, *place, view, k));
-            let is_news = words.as_ref().is_some_and(also::is_news);
+            let is_news = words.as_ref().is_some_and(spaces::is_news);
             titles.extend(if is_news { words } else { words.map(pale) });
         }
         let [line_glows, lines, labels] = self.lines(seen, spotlight.as_ref());
@@ -389,13 +372,8 @@ impl<'a> Picture<'a> {
             .clone()
             .filter_map(|(item, card, shown)| pen.glow(item, card, shown));
         // Lines do not cross words.
-        groups.extend(
-            glows
-                .chain(line_glows)
-                .chain(lines)
-                .chain(titles)
-                .chain(labels),
-        );
+        groups.extend(glows.chain(line_glows).chain(lines));
+        groups.extend(titles.into_iter().chain(labels));
         for (item, card, shown) in items {
             let mut drawn = pen.item(item, card, shown);
             if let Some(presence) = view.presences.get(shown.item()) {
@@ -404,15 +382,67 @@ impl<'a> Picture<'a> {
             let rows = card.card.iter();
             let rows = rows.flat_map(|rows| pen.card_rows(rows, &card.id, card.place, view, k));
             let all = std::iter::once(drawn).chain(rows);
-            if spotlight
-                .as_ref()
-                .is_none_or(|spot| spot.lit.contains(&shown.item()))
-            {
+            let is_lit = |spot: &Spotlight<'_>| spot.lit.contains(&shown.item());
+            if spotlight.as_ref().is_none_or(is_lit) {
                 groups.extend(all);
             } else {
                 groups.extend(all.map(pale));
             }
         }
+    }
+
+    /// The lines of a window, those of a namespace merged while they are unchanged, with one label for each fork: the glows,
+    /// which cover no head of another, the lines, and their labels; changed ones last, so that they are on top.
+    fn lines(&self, seen: &SeenWindow, spotlight: Option<&Spotlight<'_>>) -> [Vec<Group>; 3] {
+        let measured = &self.measured;
+        let links = &measured.graph.plan.links;
+        let look = |id: ArrowId| find(&seen.arrows, id.at());
+        let mut drawn = Vec::new();
+        let mut in_gates = BTreeSet::new();
+        for (gate, path) in &self.gates {
+            if let Some((shown, lines)) = gate.shown(measured.view, look) {
+                in_gates.extend(lines);
+                drawn.push((
+                    &gate.arrow,
+                    path,
+                    Cow::Owned(shown),
+                    links[gate.lead.at()].fork,
+                ));
+            }
+        }
+        for &id in self.order.iter().filter(|id| !in_gates.contains(id)) {
+            let (arrow, path) = (&measured.view.arrows[id], &self.tracks[id.at()]);
+            if let Some(shown) = look(id) {
+                drawn.push((arrow, path, Cow::Borrowed(shown), links[id.at()].fork));
+            }
+        }
+        drawn.sort_by_key(|(.., shown, _)| shown.mark.is_some());
+        // The lines of a fork have one label: that of a line that changed, which is on top.
+        let mut last: BTreeMap<usize, usize> = BTreeMap::new();
+        for (k, (.., fork)) in drawn.iter().enumerate() {
+            last.extend(fork.map(|fork| (fork, k)));
+        }
+        let pen = self.pen();
+        let mut groups = [(); 3].map(|()| Vec::new());
+        for (arrow, path, shown, fork) in &drawn {
+            let ends = [arrow.from, arrow.to].map(|id| find(&seen.items, id.at()));
+            let mut parts = pen.arrow_parts(arrow, path, shown, ends);
+            let spot = spotlight.filter(|spot| !spot.has_line(arrow, shown));
+            for part in &mut parts {
+                spot.inspect(|spot| spot.pale(part));
+            }
+            let named = fork.and_then(|fork| last.get(&fork)).map(|at| drawn[*at].1);
+            if named.is_some_and(|other| {
+                !std::ptr::eq(other, *path) && other.label_area() == path.label_area()
+            }) {
+                let label = &mut parts[2].pieces;
+                label.retain(|piece| !matches!(piece, Piece::Text(_)));
+            }
+            for (group, part) in groups.iter_mut().zip(parts) {
+                group.extend(Some(part).filter(|part| !part.pieces.is_empty()));
+            }
+        }
+        groups
     }
 
     fn pen(&self) -> GraphPen<'_> {
@@ -479,6 +509,148 @@ fn tracks(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ArrowP
             path
         })
         .collect()
+}
+
+// The page: its parts for title, graph, legend and timeline, and the scale of the graph in its part.
+
+/// The page size for which lengths of title, legend and timeline are given: the smallest common size of a screen.
+const STANDARD: Size = Size::new(1280.0, 720.0);
+/// The largest scale of the graph, over its natural size: beyond it, the names of a small graph are nearly as
+/// large as the headline.
+const LARGEST: f64 = 1.35;
+
+/// The positions of all parts of the page, equal in every frame.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct PageFrame {
+    pub(crate) size: Size,
+    /// The scale of title, legend and timeline: 1 on a page of 1280 × 720.
+    pub(crate) unit: f64,
+    /// The largest scale of the graph.
+    largest: f64,
+    /// Empty parts (`--bare`) have no height.
+    pub(crate) title: Rect,
+    pub(crate) graph: Rect,
+    pub(crate) legend: Rect,
+    pub(crate) timeline: Rect,
+}
+
+/// What is at the bottom of the page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Strip {
+    /// Nothing: two missions are compared, or a mission has a single window and no phases.
+    Nothing,
+    /// The phases of a still.
+    Phases,
+    /// The timeline of a film.
+    Timeline,
+}
+
+/// The scale and the position of the graph in its part of the page.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct GraphFit {
+    pub(crate) scale: f64,
+    /// The scale of strokes and badges: they shrink less than the elements that they surround, to stay visible.
+    pub(crate) pen: f64,
+    pub(crate) origin: Point,
+}
+
+/// The style, the fonts and the scale that the graph is drawn with.
+pub(crate) struct GraphPen<'a> {
+    pub(crate) style: &'a Style,
+    pub(crate) fonts: &'a Fonts,
+    pub(crate) fit: GraphFit,
+}
+
+impl PageFrame {
+    /// The page of these options, with `rows` rows of legend.
+    pub(crate) fn new(style: &Style, options: &PageOptions, rows: usize, bottom: Strip) -> Self {
+        let size = options.size;
+        let unit = unit(options);
+        let strip = |y: f64, height: f64| Rect::new(0.0, y, size.w, height);
+        let (mut title, mut legend, mut timeline) = (0.0, 0.0, 0.0);
+        if !options.bare {
+            title = style.title.height * unit;
+            if options.has_legend {
+                // Rows at nearly twice the text's size, so that signs of two rows do not touch.
+                legend = (style.legend.size * 1.9 * rows as f64 + 8.0) * unit;
+            }
+            if bottom != Strip::Nothing {
+                timeline = below(style, options, bottom).height(&options.timeline);
+            }
+        }
+        // On a small page the graph keeps nine tenths of each side.
+        let margin = (style.page.margin * unit)
+            .min(size.w / 20.0)
+            .min(size.h / 20.0);
+        let top = title;
+        let bottom = (size.h - legend - timeline).max(top + 1.0);
+        // The title's bar separates already.
+        let above = if options.bare { margin } else { margin / 4.0 };
+        let high = bottom - top - above - margin;
+        let graph = Rect::new(margin, top + above, size.w - 2.0 * margin, high);
+        Self {
+            size,
+            unit,
+            largest: options.largest.unwrap_or(LARGEST * unit.max(0.8)),
+            title: strip(0.0, title),
+            graph: Rect::new(graph.x, graph.y, graph.w.max(1.0), graph.h.max(1.0)),
+            legend: strip(bottom, legend),
+            timeline: strip(bottom + legend, timeline),
+        }
+    }
+
+    /// The largest scale at which a layout of this size fits, and the position of its corner, so that it is
+    /// centred.
+    pub(crate) fn fit(&self, layout: Size) -> GraphFit {
+        let (w, h) = (layout.w.max(1.0), layout.h.max(1.0));
+        let scale = (self.graph.w / w).min(self.graph.h / h).min(self.largest);
+        let middle = self.graph.centre();
+        GraphFit {
+            scale,
+            pen: libm::sqrt(scale),
+            origin: Point::new(middle.x - w * scale / 2.0, middle.y - h * scale / 2.0),
+        }
+    }
+}
+
+/// The sizes of the timeline on a page.
+pub(crate) fn below<'a>(style: &'a Style, options: &PageOptions, strip: Strip) -> BelowSizes<'a> {
+    BelowSizes {
+        style,
+        unit: unit(options),
+        is_paper: options.width_mm.is_some(),
+        is_still: strip == Strip::Phases,
+    }
+}
+
+/// The scale of title, legend and timeline on a page, by its size unless given: on a larger page it grows
+/// less than the graph.
+pub(crate) fn unit(options: &PageOptions) -> f64 {
+    if let Some(unit) = options.unit {
+        return unit;
+    }
+    let size = options.size;
+    // Below 0.62, the words of the legend would be smaller than 7 pixels.
+    let ratio = (size.w / STANDARD.w)
+        .min(size.h / STANDARD.h)
+        .clamp(0.62, 4.0);
+    // On a page twice as large, words are 1.6 times as large: the rest of it is for the graph.
+    if ratio > 1.0 {
+        libm::pow(ratio, 0.7)
+    } else {
+        ratio
+    }
+}
+
+impl GraphFit {
+    pub(crate) fn point(&self, p: Point) -> Point {
+        let Point { x, y } = self.origin;
+        Point::new(x + p.x * self.scale, y + p.y * self.scale)
+    }
+
+    pub(crate) fn rect(&self, r: Rect) -> Rect {
+        r.scaled(self.scale).moved(self.origin)
+    }
 }
 
 #[cfg(test)]

@@ -260,11 +260,7 @@ impl Group {
             Form::Path(steps) => Form::Path(steps.iter().map(|step| step.mapped(point)).collect()),
         };
         let piece = |piece: &Piece| match piece {
-            Piece::Shape(Shape {
-                form: f,
-                fill,
-                stroke,
-            }) => Piece::Shape(Shape::new(form(f), *fill, stroke.scaled(by))),
+            Piece::Shape(s) => Piece::Shape(Shape::new(form(&s.form), s.fill, s.stroke.scaled(by))),
             Piece::Text(text) => Piece::Text(Text {
                 at: point(text.at),
                 size: text.size * by,

@@ -1,20 +1,16 @@
 //! The film strip: chosen windows side by side on one page, with one legend and the time under each.
 
-pub(crate) mod choice;
-
+use super::picture::{Measured, PageOptions, Picture};
+use super::scene::{Anchor, Font, Form, Group, Piece, Scene, Shape, Stroke, Text};
+use super::style::Style;
+use super::text::{Fonts, Weight};
+use super::timeline::canvas::PX_PER_MM;
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Point, Rect, Size};
-use crate::base::time;
-use crate::base::words;
-use crate::draw::picture::{Measured, PageOptions, Picture};
-use crate::draw::scene::{Anchor, Font, Form, Group, Piece, Scene, Shape, Stroke, Text};
-use crate::draw::style::Style;
-use crate::draw::text::{Fonts, Weight};
-use crate::draw::timeline::canvas::PX_PER_MM;
+use crate::base::{time, words};
 use crate::layout::Layout;
 use crate::mission::Mission;
-use crate::view::{View, Words, joined};
-pub use choice::Choice;
+use crate::view::{Counts, View, Words, joined};
 
 /// The smallest legible text on paper, in points.
 const SMALLEST_PT: f64 = 6.0;
@@ -208,10 +204,8 @@ impl PanelGrid {
     fn corner(&self, at: usize) -> Point {
         let (row, column) = (at / self.columns, at % self.columns);
         let high = self.panel.h + 2.0 * 1.3 * self.caption + GAP;
-        Point::new(
-            GAP + column as f64 * (self.panel.w + GAP),
-            GAP + row as f64 * high,
-        )
+        let x = GAP + column as f64 * (self.panel.w + GAP);
+        Point::new(x, GAP + row as f64 * high)
     }
 }
 
@@ -248,11 +242,8 @@ impl<'a> StripSource<'a> {
         if let Some(phase) = self.picture.phase(window) {
             times = format!("{times} {phase}");
         }
-        let fits = |words: &[Words]| {
-            self.fonts
-                .width(&joined(words), page.caption, Weight::Regular)
-                <= page.panel.w
-        };
+        let wide = |text: &str| self.fonts.width(text, page.caption, Weight::Regular);
+        let fits = |words: &[Words]| wide(&joined(words)) <= page.panel.w;
         let lines = [
             (times, Weight::SemiBold),
             (joined(&frame.fitting(fits)), Weight::Regular),
@@ -283,22 +274,101 @@ impl<'a> StripSource<'a> {
         };
         let picture = Measured::new(self.view, self.style, self.fonts, options);
         let scene = picture.with(self.picture.layout().clone()).scene(0);
-        let legend = scene.groups.into_iter().find(|g| g.id == "legend");
-        let ground = legend
-            .as_ref()
-            .and_then(|legend| match legend.pieces.first()? {
-                Piece::Shape(Shape {
-                    form: Form::Rect(place, _),
-                    ..
-                }) => Some(*place),
-                _ => None,
-            });
-        let (Some(legend), Some(place)) = (legend, ground) else {
+        let Some(legend) = scene.groups.iter().find(|g| g.id == "legend") else {
+            return GAP;
+        };
+        let Some(Piece::Shape(ground)) = legend.pieces.first() else {
+            return GAP;
+        };
+        let Form::Rect(place, _) = ground.form else {
             return GAP;
         };
         groups.push(legend.placed(1.0, Point::new(0.0, y - place.y)));
         place.h + GAP
     }
+}
+
+/// The windows of a strip.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// Columns and rows: the first window and those that change most.
+    Grid(usize, usize),
+    /// The first window and all that show a change, at most a dozen.
+    Changes,
+    /// These windows, by index.
+    Windows(Vec<usize>),
+}
+
+/// The most windows on a strip that are chosen for the user: of three columns, four rows.
+const MOST: usize = 12;
+impl Choice {
+    /// Reads `3x2`, `changes` or `0,4,9`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for anything else.
+    pub fn parse(text: &str) -> Result<Self> {
+        let number = |t: &str| t.trim().parse::<usize>().ok();
+        let grid = text.split_once('x').and_then(|(columns, rows)| {
+            let (columns, rows) = (number(columns)?, number(rows)?);
+            let sound = (1..=100).contains(&columns) && (1..=100).contains(&rows);
+            sound.then_some(Self::Grid(columns, rows))
+        });
+        let windows: Option<Vec<usize>> = text.split(',').map(number).collect();
+        match (text, grid, windows) {
+            ("changes", ..) => Ok(Self::Changes),
+            (_, Some(grid), _) => Ok(grid),
+            (_, _, Some(windows)) => Ok(Self::Windows(windows)),
+            _ => Err(Error::usage(
+                format!("`{text}` is not a choice of windows"),
+                "give `--strip` columns and rows (`3x2`), `changes`, or windows (`0,4,9`)",
+            )),
+        }
+    }
+
+    /// The chosen windows as indices in `view`, in order; at least one if there is any.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a window that does not exist.
+    pub fn places(&self, view: &View) -> Result<Vec<usize>> {
+        match self {
+            Self::Grid(columns, rows) => Ok(busiest(view, columns * rows)),
+            Self::Changes => {
+                let mut changed: Vec<usize> = (0..view.frames.len()).collect();
+                changed.retain(|k| *k == 0 || view.is_changed(*k));
+                if changed.len() > MOST {
+                    changed = busiest(view, MOST);
+                }
+                Ok(changed)
+            }
+            Self::Windows(windows) => windows.iter().map(|w| place(view, *w)).collect(),
+        }
+    }
+}
+
+fn place(view: &View, index: usize) -> Result<usize> {
+    let last = view.frames.last().map_or(0, |f| f.index);
+    let found = view.frames.iter().position(|f| f.index == index);
+    found.ok_or_else(|| {
+        let what = format!("there is no window {index}");
+        Error::usage(what, format!("windows are counted from 0 to {last}"))
+    })
+}
+
+/// The first window and those that change most; if too few change, others evenly spread.
+fn busiest(view: &View, most: usize) -> Vec<usize> {
+    let changes = |t: Counts| {
+        let nodes = t.nodes_added + t.nodes_removed + t.restarted;
+        let others = t.total() - nodes - t.rates;
+        8 * nodes + 4 * others + t.rates
+    };
+    let mut order: Vec<usize> = (0..view.frames.len()).collect();
+    order.sort_by_key(|k| {
+        let changes = std::cmp::Reverse(changes(view.frames[*k].counts));
+        (*k != 0, !view.is_changed(*k), changes, *k)
+    });
+    order.truncate(most.max(1));
+    order.sort_unstable();
+    order
 }
 
 #[cfg(test)]

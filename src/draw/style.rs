@@ -1,18 +1,16 @@
 //! Styles: every colour, stroke and font size, read from `styles/*.toml`; no colour literals exist anywhere
 //! else.
 
-mod color;
-
+use std::fmt;
 use std::path::Path;
 
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer, de};
 use toml::de::DeTable;
 use toml::{Spanned, Table, Value};
 
+use super::text::Weight;
+use crate::base::cast;
 use crate::base::error::{Error, Result};
-use crate::draw::text::Weight;
-
-pub use color::Color;
 
 /// The built-in styles by name; the first is the default and complete, the others contain only the keys that differ from
 /// their `base`.
@@ -84,19 +82,6 @@ pub struct Style {
     pub(crate) count: CountBadge,
 }
 
-impl Style {
-    /// The look of a node that is away: the colour of removed elements, dotted like declared ones.
-    pub(crate) fn away(&self) -> Quiet {
-        Quiet {
-            fill: Color::NONE,
-            stroke: self.removed.color,
-            text: self.removed.color,
-            width: self.removed.width,
-            dash: self.declared.dash.clone(),
-        }
-    }
-}
-
 impl Body {
     /// Whether nodes are rounded boxes; otherwise ellipses, as in `rqt_graph`, if the corners of other boxes
     /// are not rounded either.
@@ -137,10 +122,6 @@ impl Style {
             }
         };
         file.overlay(&mut keys)?;
-        Self::from_keys(keys, path)
-    }
-
-    fn from_keys(keys: Table, path: &Path) -> Result<Self> {
         let bad = |e: toml::de::Error| Error::bad_file(path, 0, e.message(), HINT);
         keys.try_into().map_err(bad)
     }
@@ -164,6 +145,17 @@ impl Style {
         self.badge.radius *= PRINTED_BADGE;
         self.badge.glow *= PRINTED_BADGE;
         self
+    }
+
+    /// The look of a node that is away: the colour of removed elements, dotted like declared ones.
+    pub(crate) fn away(&self) -> Quiet {
+        Quiet {
+            fill: Color::NONE,
+            stroke: self.removed.color,
+            text: self.removed.color,
+            width: self.removed.width,
+            dash: self.declared.dash.clone(),
+        }
     }
 
     /// The colour behind everything.
@@ -192,10 +184,8 @@ pub fn builtin_text(name: &str) -> Result<&'static str> {
     let found = BUILTIN.iter().find(|(known, _)| *known == name);
     found.map(|(_, text)| *text).ok_or_else(|| {
         let names: Vec<_> = BUILTIN.iter().map(|(name, _)| *name).collect();
-        let hint = format!(
-            "styles: {}; or the path of a file of your own",
-            names.join(", ")
-        );
+        let names = names.join(", ");
+        let hint = format!("styles: {names}; or the path of a file of your own");
         Error::usage(format!("unknown style `{name}`"), hint)
     })
 }
@@ -292,6 +282,72 @@ fn misfit(old: &Value, new: &Value) -> Option<&'static str> {
 /// The line of a byte, counted from 1.
 fn line_at(text: &str, byte: usize) -> usize {
     text.bytes().take(byte).filter(|b| *b == b'\n').count() + 1
+}
+
+/// A colour, or none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Color(Option<[u8; 3]>);
+
+impl Color {
+    /// The colour that draws nothing.
+    pub const NONE: Self = Self(None);
+
+    /// The colour of red, green and blue.
+    pub const fn of(rgb: [u8; 3]) -> Self {
+        Self(Some(rgb))
+    }
+
+    /// Red, green and blue; `None` for no colour.
+    pub fn rgb(self) -> Option<[u8; 3]> {
+        self.0
+    }
+
+    /// Reads `#RRGGBB` or `none`.
+    pub(super) fn parse(text: &str) -> Option<Self> {
+        if text == "none" {
+            return Some(Self::NONE);
+        }
+        let hex = text.strip_prefix('#').filter(|hex| hex.len() == 6)?;
+        hex.chars().all(|c| c.is_ascii_hexdigit()).then_some(())?;
+        let byte = |at: usize| u8::from_str_radix(&hex[at..at + 2], 16).ok();
+        Some(Self(Some([byte(0)?, byte(2)?, byte(4)?])))
+    }
+
+    /// The mixture with `part` (0..=1) of a background; itself if one of them is none.
+    #[must_use]
+    pub(crate) fn faded(self, background: Self, part: f64) -> Self {
+        let both = self.0.and(background.0);
+        both.map_or(self, |_| self.towards(background, part))
+    }
+
+    /// The mixture with `part` (0..=1) of `other`; if one of them is none, the nearer.
+    #[must_use]
+    pub fn towards(self, other: Self, part: f64) -> Self {
+        let (Some(a), Some(b)) = (self.0, other.0) else {
+            return if part < 0.5 { self } else { other };
+        };
+        let mix = |at: usize| {
+            let (a, b) = (f64::from(a[at]), f64::from(b[at]));
+            cast::to_u8(libm::round(a + (b - a) * part.clamp(0.0, 1.0)))
+        };
+        Self(Some([mix(0), mix(1), mix(2)]))
+    }
+}
+
+impl fmt::Display for Color {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Some([r, g, b]) => write!(f, "#{r:02X}{g:02X}{b:02X}"),
+            None => f.write_str("none"),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Color {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(from)?;
+        Self::parse(&text).ok_or_else(|| de::Error::custom("no colour"))
+    }
 }
 
 #[cfg(test)]
@@ -421,5 +477,17 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn colours_mix() {
+        let (black, white) = (
+            Color::parse("#000000").unwrap(),
+            Color::parse("#ffffff").unwrap(),
+        );
+        assert_eq!(black.towards(white, 0.5).to_string(), "#808080");
+        assert_eq!(Color::NONE.towards(white, 0.6), white);
+        assert_eq!(Color::parse("#12345"), None);
+        assert_eq!(Color::parse("#+2345f"), None);
     }
 }

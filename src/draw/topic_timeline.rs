@@ -3,22 +3,20 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::cast;
+use super::picture::{PageFrame, Strip, unit};
+use super::timeline::FigureSource;
+use super::timeline::rows::{by_namespace, numbered, together};
 use crate::base::geometry::{Rect, Size};
-use crate::base::words;
+use crate::base::{cast, words};
 use crate::draw::picture::PageOptions;
-use crate::draw::picture::page::{PageFrame, Strip, unit};
 use crate::draw::picture::title::Title;
 use crate::draw::scene::Scene;
 use crate::draw::style::{Color, Style};
 use crate::draw::text::Fonts;
 use crate::draw::timeline::Timeline;
-use crate::draw::timeline::arranged::{by_namespace, numbered, together};
 use crate::draw::timeline::canvas::{PaperCanvas, Sizes, Type, ink};
 use crate::draw::timeline::drawer::{Density, Drawer, fitting};
 use crate::draw::timeline::rows::{Row, of_topics};
-use crate::draw::timeline::source::FigureSource;
-
 use crate::graph::{Element, ElementState, NodeId};
 use crate::mission::event_log::Kind;
 use crate::view::{Frame, View, headline};
@@ -183,11 +181,7 @@ impl<'a> TopicTimeline<'a> {
         canvas.begin("why");
         let wide = self.options.size.w / self.scale - 2.0 * self.drawer.left;
         let why = self.why();
-        let window = if is_window {
-            "; frame: this window"
-        } else {
-            ""
-        };
+        let window = ["", "; frame: this window"][usize::from(is_window)];
         let signs = format!("{why}. Tick: first message; cross: last{window}.");
         let (reason, _) = why.split_once("; ").unwrap_or((why, ""));
         let texts = [&signs, why, reason].into_iter();

@@ -3,34 +3,36 @@
 //! `player/` contains the handwritten parts of the page: its template, its style sheet, and its script in parts, which are
 //! joined in order. [`data`] defines the data for the script.
 
-mod changes;
 mod data;
-mod element_runs;
-mod signs;
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
+use serde::Serialize;
+
+use super::sequence::{Sequence, UnionDrawings};
+use super::target::Target;
 use super::{Started, one_text};
 use crate::base::digest;
 use crate::base::notice::NoticeKind;
-use crate::base::words;
-use crate::base::words::visible;
-use crate::draw::paint::classes::{self, Classes};
+use crate::base::time::Stamp;
+use crate::base::words::{self, visible};
+use crate::draw::paint::classes::{self, Classes, badge_shapes};
 use crate::draw::paint::svg;
 use crate::draw::paint::xml::Xml;
 use crate::draw::picture::title::SIDES;
-use crate::draw::picture::{Union, rate_label};
+use crate::draw::picture::{LegendSign, Union, change_counts, rate_label, signs};
 use crate::draw::style::{BUILTIN, Style};
 use crate::draw::text;
 use crate::draw::timeline::Timeline;
+use crate::draw::timeline::marks::Sign;
 use crate::draw::topic_timeline::Overview;
-use crate::export::sequence::{Sequence, UnionDrawings};
-use crate::export::target::Target;
-use crate::graph::Id as _;
+use crate::graph::{Element, Id as _, State};
+use crate::mission::EventId;
+use crate::mission::event_log::{Event, Kind, LogFormat, LogLine, LogRow, interrupted, row_lines};
 use crate::mission::info::info;
-use crate::view::{ArrowId, ItemId, View};
-use changes::PageChanges;
-use element_runs::ViewRuns;
+use crate::view::{ArrowId, Frame, Headline, ItemId, Mark, OngoingEvent, View};
+use data::ViewRuns;
 
 const PAGE: &str = include_str!("html/player/page.html");
 const LOOK: &str = include_str!("html/player/page.css");
@@ -148,11 +150,7 @@ impl HtmlPage<'_> {
             digest::policy(&fonts),
             digest::policy(&look),
         );
-        let schemes = if self.dark.is_some() {
-            "light dark"
-        } else {
-            "normal"
-        };
+        let schemes = self.dark.map_or("normal", |_| "light dark");
         let view = self.whole.view;
         let is_paired = self.sequence.options.pairs.is_some();
         let kind = match self.overview {
@@ -160,11 +158,6 @@ impl HtmlPage<'_> {
             None if view.compares && is_paired => "compares paired",
             None if view.compares => "compares",
             None => "",
-        };
-        let escaped = |text: &str| {
-            let mut xml = Xml::default();
-            xml.text(text);
-            xml.finish()
         };
         let title = escaped(&visible(self.title));
         let sentence = info(self.sequence.mission).summary;
@@ -197,8 +190,7 @@ impl HtmlPage<'_> {
     }
 
     fn look(&self) -> String {
-        let mut words: std::collections::BTreeSet<&str> =
-            self.drawn().flat_map(|d| d.runs.words()).collect();
+        let mut words: BTreeSet<&str> = self.drawn().flat_map(|d| d.runs.words()).collect();
         // For comparisons and for the legend.
         words.extend([
             "added", "removed", "changed", "faster", "slower", "silent", "w2", "w5",
@@ -218,21 +210,34 @@ impl HtmlPage<'_> {
         rules(self.style) + &dark + &squeezed(LOOK)
     }
 
-    /// The badges, once for all drawings.
+    /// The definitions of all badges, once for all drawings.
     fn signs(&self) -> String {
         let mut xml = Xml::default();
-        signs::badges(&mut xml, self.style);
+        xml.open("defs");
+        // A comparison of two windows may need one that no window shows.
+        for mark in Mark::badged() {
+            badge_shapes(&mut xml, self.style, mark);
+        }
+        xml.close();
         xml.finish()
     }
 
+    /// The meaning of the signs that occur, as HTML.
     fn legend(&self, lives: Option<&Timeline>) -> String {
-        // The timeline of topics has no boxes and lines.
-        let views: Vec<&View> = match self.overview {
-            Some(_) => Vec::new(),
-            None => self.drawn().map(|d| d.view).collect(),
-        };
+        let mut out = String::new();
+        let mut shown: Vec<String> = Vec::new();
         let change = self.sequence.unfolded.map_or(0.25, |u| u.rate_change);
-        signs::legend(&views, change) + &lives.map(signs::timeline).unwrap_or_default()
+        // The timeline of topics has no boxes and lines.
+        let drawn = self.drawn().filter(|_| self.overview.is_none());
+        for (sign, words) in drawn.flat_map(|drawn| signs(drawn.view, change)) {
+            if !shown.contains(&words) {
+                let (sign, text) = (picture(&sign), escaped(&words));
+                let svg = format!("<svg viewBox=\"0 0 40 20\">{sign}</svg>");
+                let _ = write!(out, "<span>{svg} {text}</span>");
+                shown.push(words);
+            }
+        }
+        out + &lives.map(timeline_legend).unwrap_or_default()
     }
 
     /// The notices about hidden elements and problems, one per line.
@@ -339,6 +344,12 @@ fn timeline(overview: &Overview) -> String {
     )
 }
 
+fn escaped(text: &str) -> String {
+    let mut xml = Xml::default();
+    xml.text(text);
+    xml.finish()
+}
+
 fn fonts() -> String {
     let mut css = String::new();
     for (weight, data) in [(400, text::REGULAR), (600, text::SEMIBOLD)] {
@@ -370,6 +381,264 @@ fn fill(template: &str, value: impl Fn(&str) -> String) -> String {
         out.push_str(rest);
     }
     out
+}
+
+// The legend of the signs that occur.
+
+const BOX: &str = "<rect x=\"5\" y=\"4\" width=\"26\" height=\"12\" rx=\"2\"/>";
+const LINE: &str = "<path d=\"M3 10h24\"/><path d=\"M34 10l-8-4v8z\"/>";
+
+/// The meaning of the marks that occur on the timeline, as HTML.
+fn timeline_legend(timeline: &Timeline) -> String {
+    let marks = timeline.marks();
+    let has = |signs: &[Sign]| marks.iter().any(|(_, mark)| signs.contains(&mark.sign));
+    let mut out = String::new();
+    let mut add = |signs: &[Sign], class: &str, path: &str, words: &str| {
+        if has(signs) {
+            let path = format!("<path class=\"{class}\" d=\"{path}\"/>");
+            let svg = format!("<svg viewBox=\"0 0 40 20\" class=\"marks\">{path}</svg>");
+            let _ = write!(out, "<span>{svg} {words}</span>");
+        }
+    };
+    let dots = [Sign::Dot, Sign::Letter];
+    add(&[Sign::Start], "start", "M18 3v14", "begins");
+    add(&[Sign::End], "end", "M13 5l10 10m0 -10l-10 10", "ends");
+    add(&dots, "event", "M13 10l5 -5l5 5l-5 5z", "changes");
+    let arrow = "M18 3V17m-3 -4l3 4l3 -4";
+    add(&[Sign::Handover], "takeover", arrow, "handed over");
+    out
+}
+
+fn picture(sign: &LegendSign) -> String {
+    let front = BOX
+        .replace("y=\"4\"", "y=\"7\"")
+        .replace("\"26\"", "\"23\"");
+    match sign {
+        LegendSign::Node => group(
+            "node",
+            "<rect x=\"3\" y=\"3\" width=\"30\" height=\"14\" rx=\"7\"/>",
+        ),
+        LegendSign::Topic => group("topic", BOX),
+        LegendSign::Group => group("topic", &format!("{BOX}{front}")),
+        LegendSign::Namespace => group("node", &format!("{BOX}{front}")),
+        LegendSign::Change(mark) => {
+            let word = mark.badge();
+            let badge = format!("<use href=\"#{word}\" class=\"{word}\" x=\"31\" y=\"5\"/>");
+            group(
+                &format!("topic {} {word}", mark.class()),
+                &(BOX.to_owned() + &badge),
+            )
+        }
+        LegendSign::Box(State::Latched) => {
+            let bar = "<rect class=\"l\" x=\"6\" y=\"5\" width=\"3\" height=\"10\"/>";
+            group("topic latched", &(BOX.to_owned() + bar))
+        }
+        LegendSign::Box(state) => group(&format!("topic {}", state.word()), BOX),
+        LegendSign::Line(confidence) => group(&format!("edge active {}", confidence.word()), LINE),
+        // Pages draw every topic as a box.
+        LegendSign::Row => String::new(),
+        LegendSign::Service => group("topic", "<path d=\"M3 10l6 -6h18l6 6l-6 6h-18z\"/>"),
+        LegendSign::Starved => group(
+            "edge active stated",
+            "<path d=\"M3 10h24\"/><path d=\"M27 4h3v12h-3z\"/>",
+        ),
+        LegendSign::Width => group("edge active w5", LINE),
+    }
+}
+
+fn group(class: &str, inside: &str) -> String {
+    format!("<g class=\"{class}\">{inside}</g>")
+}
+
+// The changes that a page lists, read from the event log: per window for the script, and as a table for readers without
+// scripts, for printing, and for links into the mission.
+
+/// The headlines of a window, the interruptions that begin in it, and the elements that are back in it: its index, the number of
+/// headlines, the texts of the three badges, its lines, and the film's headline.
+#[derive(Serialize)]
+struct ChangedWindow(usize, usize, [String; 3], Vec<ChangeLine>, String);
+
+/// A change: its time in seconds, its sign (0 appeared, 1 vanished, 2 changed), its element (-1 for one that is not drawn),
+/// its sentence, its index in the log unless it is an interruption, and its time in words.
+#[derive(Serialize)]
+struct ChangeLine(f64, u8, i64, String, Option<EventId>, String);
+
+/// The most headlines of one window that are listed; the rest is counted.
+const MOST_REPORTED: usize = 200;
+/// The most rows of the table; the rest is counted.
+const MOST_ROWS: usize = 200;
+/// The most phrases of a window's headline; the rest is counted.
+const MOST_PHRASES: usize = 5;
+
+/// The origin of times in seconds.
+#[derive(Clone, Copy)]
+struct PageClock(Stamp);
+
+impl PageClock {
+    /// The seconds from the origin to `at`, rounded down to milliseconds, as everywhere.
+    fn secs(self, at: Stamp) -> f64 {
+        at.since(self.0).div_euclid(1_000_000) as f64 / 1e3
+    }
+}
+
+/// The element that represents each node, topic and edge.
+fn places(drawn: &PageGraph<'_>) -> BTreeMap<Element, u32> {
+    let mut places = BTreeMap::new();
+    let items = drawn.view.items.iter().map(|item| &item.members);
+    let arrows = drawn.order.iter().map(|id| &drawn.view.arrows[*id].members);
+    for (members, place) in items.chain(arrows).zip(0..) {
+        for member in members {
+            places.entry(*member).or_insert(place);
+        }
+    }
+    places
+}
+
+/// The changes that a page lists.
+struct PageChanges {
+    /// The windows with changes.
+    windows: Vec<ChangedWindow>,
+    /// The element that represents each node, topic and edge.
+    places: BTreeMap<Element, u32>,
+    clock: PageClock,
+    /// The lifelines of the mission, if there are any.
+    lives: Option<Timeline>,
+}
+
+impl PageChanges {
+    fn new(page: &HtmlPage<'_>) -> Self {
+        let (mission, whole) = (page.sequence.mission, &page.whole);
+        let view = whole.view;
+        let places = places(whole);
+        let clock = PageClock(view.frames.first().map_or(Stamp(0), |f| f.span.start));
+        let events = mission.log.events.with_ids();
+        let events: Vec<_> = events.filter(|(_, event)| event.is_headline()).collect();
+        let rows = events.iter().map(|(id, event)| LogRow::Event(*id, event));
+        let rows: Vec<LogRow<'_>> = rows.collect();
+        let written = row_lines(mission, &rows, LogFormat::Text);
+        let said = events
+            .iter()
+            .zip(&written)
+            .map(|((id, event), line)| (*id, (*event, line)));
+        let said: BTreeMap<EventId, (&Event, &LogLine)> = said.collect();
+        let place = |what: &Element| places.get(what).map_or(-1, |at| i64::from(*at));
+        // Two missions have no common time.
+        let secs =
+            |frame: &Frame, at| clock.secs(if view.compares { frame.span.start } else { at });
+        let back = |frame: &Frame, last: &OngoingEvent| {
+            let (end, away) = (last.ended?, last.ended?.since(last.since));
+            let (node, topic) = mission.elements.names(last.what);
+            let name = visible(node.or(topic).unwrap_or_default());
+            let text = format!("{name} is back after {}", words::duration(away));
+            let when = words::offset_tenths(mission.offset(end));
+            let at = secs(frame, end);
+            let (place, event) = (place(&last.what), Some(last.event));
+            Some(ChangeLine(at, 2, place, text, event, when))
+        };
+        let line = |frame: &Frame, headline: &Headline| {
+            let (event, line) = said.get(&headline.event)?;
+            let sign = match event.kind {
+                Kind::Started | Kind::Appeared => 0,
+                Kind::Stopped | Kind::Vanished => 1,
+                _ => 2,
+            };
+            // The list is sorted by the best estimate of each time, so that it has no ranges.
+            let when = match line.lead().trim() {
+                range if range.contains('–') => {
+                    format!("~{}", words::offset_seconds(mission.offset(event.time)))
+                }
+                exact => exact.to_owned(),
+            };
+            let (at, place) = (secs(frame, event.time), place(&headline.what));
+            let (text, id) = (line.words.clone(), Some(headline.event));
+            Some(ChangeLine(at, sign, place, text, id, when))
+        };
+        let interruptions = |frame: &Frame| {
+            let all = mission.log.interruptions.iter();
+            let inside = all.filter(|one| frame.span.contains(one.time));
+            let line = inside.map(|one| {
+                let when = words::offset_tenths(mission.offset(one.time));
+                let at = clock.secs(one.time);
+                ChangeLine(at, 2, -1, interrupted(one), None, when)
+            });
+            line.collect::<Vec<_>>()
+        };
+        let frames = view.frames.iter().enumerate();
+        let frames = frames.filter(|(_, frame)| frame.is_changed());
+        let windows = frames.map(|(at, frame)| {
+            let mut counts = change_counts(&frame.counts).map(|(text, _)| text);
+            let returns = frame.ongoing.iter().filter_map(|last| back(frame, last));
+            let returns: Vec<ChangeLine> = returns.collect();
+            if frame.headlines.is_empty() && !returns.is_empty() {
+                counts[2] = format!("{} back", returns.len());
+            }
+            let headlines = frame.headlines.iter().take(MOST_REPORTED);
+            let headlines = headlines.filter_map(|headline| line(frame, headline));
+            let lines = interruptions(frame).into_iter().chain(headlines);
+            ChangedWindow(
+                at,
+                frame.counts.total(),
+                counts,
+                lines.chain(returns).collect(),
+                visible(&frame.words(MOST_PHRASES)).into_owned(),
+            )
+        });
+        let windows: Vec<ChangedWindow> = windows.collect();
+        // The list has every mark: a part of an event is marked only if the event is listed.
+        let listed = windows
+            .iter()
+            .flat_map(|w| w.3.iter().filter_map(|line| line.4));
+        let listed: BTreeSet<EventId> = listed.collect();
+        let whole = |id| mission.log.events.get(id).and_then(|event| event.part_of);
+        let is_listed = |id: &EventId| view.compares || listed.contains(&whole(*id).unwrap_or(*id));
+        let mut lives = page.sequence.unfolded.and_then(|u| u.lives).cloned();
+        for row in lives.iter_mut().flat_map(|lives| &mut lives.rows) {
+            row.marks.retain(|mark| mark.events.iter().any(is_listed));
+        }
+        Self {
+            windows,
+            places,
+            clock,
+            lives,
+        }
+    }
+
+    /// A row per change: its time as a link, and its sentence; empty without changes.
+    fn table(&self, compares: bool) -> String {
+        let lines = self.windows.iter();
+        let lines = lines.flat_map(|w| w.3.iter().map(|line| (w.0, line)));
+        let mut lines: Vec<(usize, &ChangeLine)> = lines.collect();
+        // Windows may overlap.
+        lines.sort_by(|(_, a), (_, b)| a.0.total_cmp(&b.0).then(a.4.cmp(&b.4)));
+        lines.dedup_by(|(_, a), (_, b)| (a.0, a.4) == (b.0, b.4));
+        let mut xml = Xml::default();
+        if lines.is_empty() {
+            return String::new();
+        }
+        xml.open("details").attribute("open", "");
+        let summary = ["All changes", "Differences"][usize::from(compares)];
+        xml.leaf("summary", summary);
+        if lines.len() > MOST_ROWS {
+            let text = format!("The first {MOST_ROWS} of {}:", lines.len());
+            xml.leaf("p", &text);
+        }
+        xml.open("table")
+            .open("tbody")
+            .attribute("id", "allchanges");
+        for (window, ChangeLine(at, _, _, text, event, when)) in lines.into_iter().take(MOST_ROWS) {
+            let when = if compares { SIDES[window.min(1)] } else { when };
+            xml.open("tr");
+            if let Some(event) = event {
+                xml.attribute("data-entry", event);
+            }
+            xml.open("th");
+            xml.open("a").attribute("href", format_args!("#t={at}"));
+            xml.text(when).close().close();
+            xml.leaf("td", text).close().raw("\n");
+        }
+        xml.close().close().close();
+        xml.finish()
+    }
 }
 
 #[cfg(test)]

@@ -231,10 +231,8 @@ pub(crate) fn difference(before: &[u8], after: &[u8], width: usize) -> Option<Ar
     let differing = rows().take(bottom + 1).skip(top).filter(|(a, b)| a != b);
     for (a, b) in differing {
         let mut differs = a.iter().zip(b).map(|(a, b)| a != b);
-        left = differs
-            .clone()
-            .position(|d| d)
-            .map_or(left, |at| left.min(at));
+        let first = differs.clone().position(|d| d);
+        left = first.map_or(left, |at| left.min(at));
         right = differs.rposition(|d| d).map_or(right, |at| right.max(at));
     }
     Some(Area {
@@ -251,11 +249,8 @@ pub(crate) fn patch(before: &[u8], after: &[u8], width: usize, area: Area, clear
     for row in area.y..area.y + area.height {
         let from = row * width + area.x;
         let (a, b) = (&before[from..][..area.width], &after[from..][..area.width]);
-        pixels.extend(
-            a.iter()
-                .zip(b)
-                .map(|(a, b)| if a == b { clear } else { *b }),
-        );
+        let pairs = a.iter().zip(b);
+        pixels.extend(pairs.map(|(a, b)| if a == b { clear } else { *b }));
     }
     pixels
 }

@@ -1,17 +1,20 @@
-//! Drawings as SVG, PNG and WebP: one per window, or the strip.
+//! Drawings as SVG, PNG and WebP: one per window, or the strip; and the whole sequence as one animated SVG.
+
+use std::io::Write as _;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder as _};
 
-use super::{DrawnFrame, Encoder, Needs, Pack, Packet, Written};
+use super::sequence::{FrameTime, Sequence, Shows};
+use super::sink::write_file;
+use super::target::Target;
+use super::{DrawnFrame, Encoder, Needs, OneDrawing, Pack, Packet, Started, Written, one_file};
 use crate::base::error::{Error, Result};
+use crate::draw::paint::animated::AnimatedScenes;
 use crate::draw::paint::raster::Pixels;
 use crate::draw::paint::svg;
 use crate::draw::scene::Scene;
-use crate::export::sequence::{FrameTime, Sequence, Shows};
-use crate::export::sink::write_file;
-use crate::export::target::Target;
 
 /// The formats of still drawings.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -31,24 +34,32 @@ struct Images<'a> {
     written: Written,
 }
 
-/// Begins the drawings: one of the whole, or one per window.
+/// Begins the drawings: one of the whole, one per window, or an animated SVG.
+///
+/// # Errors
+/// As [`one_file`].
 pub(crate) fn start<'a>(
     sequence: &'a Sequence<'a>,
     target: &Target,
     kind: StillKind,
-    shows: Shows<'a>,
-) -> Box<dyn Encoder + 'a> {
-    Box::new(Images {
+) -> Started<'a> {
+    let whole = match kind {
+        StillKind::Svg => OneDrawing::Asked,
+        StillKind::Png | StillKind::WebP => OneDrawing::Always,
+    };
+    let strip = match (kind, sequence.shows(target, whole)) {
+        (StillKind::Svg, Shows::Film) => return animation(sequence, target),
+        (_, Shows::Whole(scene)) => Some(scene),
+        (_, Shows::Film | Shows::Windows) => None,
+    };
+    Ok(Box::new(Images {
         kind,
         sequence,
-        strip: match shows {
-            Shows::Whole(scene) => Some(scene),
-            Shows::Film | Shows::Windows => None,
-        },
+        strip,
         target: target.clone(),
         windows: sequence.view.frames.len(),
         written: Written::to(target),
-    })
+    }))
 }
 
 impl Images<'_> {
@@ -124,6 +135,27 @@ fn encoded(kind: StillKind, pixels: &Pixels) -> Result<Vec<u8>> {
         Error::usage(what, "try a smaller `--size`")
     })?;
     Ok(out)
+}
+
+/// The number of elements above which browsers need a third of a core or more to show it, even with reduced motion.
+const MANY: usize = 100;
+
+/// Begins the animation.
+fn animation<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
+    one_file(target, "all windows are in one file", move |sink| {
+        let elements = sequence.view.items.len() + sequence.view.arrows.len();
+        let remark =
+            format!("an animated SVG of {elements} elements is slow in browsers; prefer a GIF");
+        let remarks = (elements > MANY).then_some(remark).into_iter().collect();
+        let times = sequence.frame_times(true);
+        let busiest = sequence.view.busiest();
+        let still = times.iter().rposition(|time| time.window <= busiest);
+        let scene = |time: &FrameTime| (sequence.picture.scene(time.window), time.ms);
+        let scenes = AnimatedScenes::new(times.iter().map(scene));
+        let title = sequence.picture.title().unwrap_or_default();
+        let text = scenes.write(title, still.unwrap_or(0));
+        sink.write_all(text.as_bytes()).map(|()| remarks)
+    })
 }
 
 #[cfg(test)]

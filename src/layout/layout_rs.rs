@@ -17,7 +17,7 @@ use ::layout::topo::layout::VisualGraph;
 use ::layout::topo::placer::Placer;
 
 use super::layered::{PlacedPart, assembled, routed};
-use super::layered::{acyclic, labels, order, parts, rank};
+use super::layered::{labels, order, parts, rank};
 use super::layers::{Lane, cut};
 use super::spacing::{Spacing, turned};
 use super::{
@@ -111,7 +111,7 @@ fn lay_out(plan: &Plan, options: &LayoutOptions, orientation: Orientation) -> Re
 fn block(task: PartTask<'_>) -> Option<PlacedPart> {
     let part = task.part;
     let n = part.vertices.len();
-    let reversed = acyclic::in_order(n, &part.ends);
+    let reversed = rank::in_order(n, &part.ends);
     let ranks = rank::ranks(n, &rank::turned(&part.ends, &reversed));
     let layers = cut(task.plan, part, &ranks, Lane::Outside);
     let order::LayerOrder { rows, crossings } = order::order(&layers, EFFORT);

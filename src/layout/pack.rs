@@ -1,5 +1,8 @@
-//! The packing of blocks side by side: shelves, tallest first, towards the page's aspect.
+//! The packing of blocks side by side: shelves, tallest first, towards the page's aspect; and the layout that packs all boxes,
+//! for graphs too large for layers.
 
+use super::routes::around;
+use super::{Layout, LayoutOptions, Orientation, Plan};
 use crate::base::geometry::{Point, Rect, Size};
 
 /// Top left corners for blocks of these sizes, `gap` apart, and the size of the whole. Several widths are
@@ -8,20 +11,13 @@ pub(crate) fn pack(sizes: &[Size], page: Size, gap: f64) -> (Vec<Point>, Size) {
     let widest = sizes.iter().map(|size| size.w).fold(0.0, f64::max);
     let area: f64 = sizes.iter().map(|s| (s.w + gap) * (s.h + gap)).sum();
     let ideal = (area * page.w / page.h).sqrt();
-    (0..24)
-        .map(|step| {
-            shelves(
-                sizes,
-                widest.max(ideal * (0.8 + 0.05 * f64::from(step))),
-                (gap, gap),
-            )
-        })
-        .map(|(places, whole)| (fit(whole, page), places, whole))
-        .reduce(|best, next| if next.0 > best.0 { next } else { best })
-        .map_or_else(
-            || (Vec::new(), Size::default()),
-            |(_, places, whole)| (places, whole),
-        )
+    let tried = (0..24).map(|step| {
+        let width = widest.max(ideal * (0.8 + 0.05 * f64::from(step)));
+        let (places, whole) = shelves(sizes, width, gap);
+        (fit(whole, page), (places, whole))
+    });
+    let best = tried.reduce(|best, next| if next.0 > best.0 { next } else { best });
+    best.map(|(_, packed)| packed).unwrap_or_default()
 }
 
 /// Top left corners for blocks of these sizes, at least `gap` from what the others take (`taken`, for each block relative
@@ -39,22 +35,17 @@ pub(crate) fn nested(
     let mut places = vec![Point::default(); sizes.len()];
     let (mut whole, mut full) = (Size::default(), Vec::<Rect>::new());
     for i in order {
-        let start = || std::iter::once(0.0);
-        let mut xs: Vec<f64> = start()
-            .chain(full.iter().map(|r| r.right() + gap))
-            .collect();
-        let mut ys: Vec<f64> = start()
-            .chain(full.iter().map(|r| r.bottom() + gap))
-            .collect();
-        for along in [&mut xs, &mut ys] {
-            along.sort_by(f64::total_cmp);
-            along.dedup_by(|a, b| (*a - *b).abs() < SAME);
-        }
+        let starts = |end: fn(&Rect) -> f64| {
+            let ends = full.iter().map(|taken| end(taken) + gap);
+            let mut starts: Vec<f64> = std::iter::once(0.0).chain(ends).collect();
+            starts.sort_by(f64::total_cmp);
+            starts.dedup_by(|a, b| (*a - *b).abs() < SAME);
+            starts
+        };
+        let (xs, ys) = (starts(Rect::right), starts(Rect::bottom));
         let mut best: Option<(f64, Point, Size)> = None;
-        for at in ys
-            .iter()
-            .flat_map(|y| xs.iter().map(|x| Point::new(*x, *y)))
-        {
+        let corners = ys.iter();
+        for at in corners.flat_map(|y| xs.iter().map(|x| Point::new(*x, *y))) {
             let size = Size::new(
                 whole.w.max(at.x + sizes[i].w),
                 whole.h.max(at.y + sizes[i].h),
@@ -86,27 +77,95 @@ pub(crate) fn fit(whole: Size, page: Size) -> f64 {
 
 /// The corners of blocks on shelves of this width, the highest blocks first, and the total size; `gap` is the
 /// space between blocks side by side, and between shelves.
-pub(crate) fn shelves(sizes: &[Size], width: f64, gap: (f64, f64)) -> (Vec<Point>, Size) {
+fn shelves(sizes: &[Size], width: f64, gap: f64) -> (Vec<Point>, Size) {
     let mut order: Vec<usize> = (0..sizes.len()).collect();
     order.sort_by(|&a, &b| sizes[b].h.total_cmp(&sizes[a].h).then(a.cmp(&b)));
     let mut places = vec![Point::default(); sizes.len()];
     let (mut x, mut y, mut shelf, mut whole) = (0.0, 0.0, 0.0_f64, Size::default());
     for i in order {
         if x > 0.0 && x + sizes[i].w > width {
-            (x, y) = (0.0, y + shelf + gap.1);
+            (x, y) = (0.0, y + shelf + gap);
             shelf = 0.0;
         }
         places[i] = Point::new(x, y);
         whole = Size::new(whole.w.max(x + sizes[i].w), whole.h.max(y + sizes[i].h));
-        x += sizes[i].w + gap.0;
+        x += sizes[i].w + gap;
         shelf = shelf.max(sizes[i].h);
     }
     (places, whole)
 }
 
+/// The space between boxes, and between a frame and its boxes: no lines run there.
+const GAP: f64 = 14.0;
+const PADDING: f64 = 8.0;
+
+/// The layout with all boxes packed by namespace, edges as straight as possible.
+pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
+    let (n, k) = (plan.vertices.len(), plan.clusters.len());
+    // Indices `n..` are clusters; the last group contains vertices in none.
+    let mut members: Vec<Vec<usize>> = vec![Vec::new(); k + 1];
+    for (v, vertex) in plan.vertices.iter().enumerate() {
+        members[vertex.cluster.unwrap_or(k)].push(v);
+    }
+    let mut sizes: Vec<Size> = plan.vertices.iter().map(|vertex| vertex.size).collect();
+    sizes.resize(n + k, Size::default());
+    let mut corners = vec![Point::default(); n + k];
+    for (c, cluster) in plan.clusters.iter().enumerate().rev() {
+        if members[c].is_empty() {
+            continue;
+        }
+        let inside = packed(&members[c], &sizes, options.page, &mut corners);
+        let width = inside.w.max(cluster.title.w);
+        sizes[n + c] = Size::new(
+            width + 2.0 * PADDING,
+            inside.h + cluster.title.h + 2.0 * PADDING,
+        );
+        members[cluster.parent.unwrap_or(k)].push(n + c);
+    }
+    let size = packed(&members[k], &sizes, options.page, &mut corners);
+    for (c, cluster) in plan.clusters.iter().enumerate() {
+        let corner = Point::new(
+            corners[n + c].x + PADDING,
+            corners[n + c].y + cluster.title.h + PADDING,
+        );
+        for &member in &members[c] {
+            corners[member] =
+                Point::new(corners[member].x + corner.x, corners[member].y + corner.y);
+        }
+    }
+    let rects = corners
+        .iter()
+        .zip(&sizes)
+        .map(|(at, size)| Rect::new(at.x, at.y, size.w, size.h));
+    let mut boxes: Vec<Rect> = rects.collect();
+    let clusters = boxes.split_off(n);
+    let (routes, _) = around::routes(plan, &boxes);
+    Layout {
+        orientation: options.orientation.unwrap_or(Orientation::LeftRight),
+        size,
+        boxes,
+        routes,
+        clusters,
+        remarks: vec![
+            "too large for layers: packed by namespace; edges may cross boxes".to_owned(),
+        ],
+    }
+}
+
+/// Packs some members and records their corners; returns the total size.
+fn packed(members: &[usize], sizes: &[Size], page: Size, corners: &mut [Point]) -> Size {
+    let own: Vec<Size> = members.iter().map(|&member| sizes[member]).collect();
+    let (places, whole) = pack(&own, page, GAP);
+    for (&member, place) in members.iter().zip(places) {
+        corners[member] = place;
+    }
+    whole
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layout::tests::{cluster, link, vertex};
 
     #[test]
     fn twelve_squares_fill_a_wide_page() {
@@ -125,5 +184,26 @@ mod tests {
             pack(&[], Size::new(1.0, 1.0), 10.0),
             (Vec::new(), Size::default())
         );
+    }
+
+    #[test]
+    fn clusters_hold_their_members_only() {
+        let plan = Plan {
+            vertices: vec![vertex(Some(1)), vertex(None), vertex(Some(0))],
+            links: vec![link(0, 1)],
+            clusters: vec![cluster(None), cluster(Some(0))],
+            ..Plan::default()
+        };
+        let page = Size::new(800.0, 450.0);
+        let layout = lay_out(
+            &plan,
+            &LayoutOptions {
+                page,
+                ..LayoutOptions::default()
+            },
+        );
+        let inside = |v: usize, c: usize| layout.boxes[v].overlaps(&layout.clusters[c]);
+        assert!(inside(0, 1) && inside(0, 0) && inside(2, 0));
+        assert!(!inside(2, 1) && !inside(1, 0));
     }
 }

@@ -74,12 +74,7 @@ pub(crate) struct Spacing<'a> {
 
 impl<'a> Spacing<'a> {
     pub(crate) fn new(task: PartTask<'_>, layers: &'a Layers) -> Self {
-        let PartTask {
-            plan,
-            part,
-            orientation,
-            ..
-        } = task;
+        let (plan, part, orientation) = (task.plan, task.part, task.orientation);
         let mut loops = vec![0; part.vertices.len()];
         for &(from, _) in part.ends.iter().filter(|(from, to)| from == to) {
             loops[from] += 1;
@@ -155,14 +150,11 @@ impl<'a> Spacing<'a> {
 
     /// The reach of an item across from its middle; borders reach inwards only.
     fn reach(&self, item: usize, onwards: bool) -> f64 {
-        match (self.layers.kind[item], self.orientation) {
-            (LayerItem::Vertex, _) => self.size[item].h / 2.0 + self.loop_room(item),
-            (LayerItem::Top, Orientation::LeftRight) if onwards => {
-                PADDING + self.title[self.layers.home[item]].h
-            }
-            (LayerItem::Top, Orientation::TopBottom) if onwards => PADDING,
-            (LayerItem::Bottom, _) if !onwards => PADDING + self.footer[self.layers.home[item]].1,
-            (LayerItem::Bend, _) if onwards == self.is_label_onwards() => {
+        match self.layers.kind[item] {
+            LayerItem::Vertex => self.size[item].h / 2.0 + self.loop_room(item),
+            LayerItem::Top if onwards => self.headroom(self.layers.home[item]),
+            LayerItem::Bottom if !onwards => PADDING + self.footer[self.layers.home[item]].1,
+            LayerItem::Bend if onwards == self.is_label_onwards() => {
                 self.worded.get(&item).map_or(0.0, |size| size.h + ASIDE)
             }
             _ => 0.0,
@@ -182,22 +174,15 @@ impl<'a> Spacing<'a> {
         columns: &[(f64, f64)],
     ) -> Option<Point> {
         let bend = chain.iter().find(|item| self.worded.contains_key(item))?;
-        let (start, end) = columns[self.layers.rank[*bend]];
-        Some(Point::new(
-            f64::midpoint(start, end),
-            self.beside(*bend, across),
-        ))
+        Some(self.beside(*bend, across, columns))
     }
 
-    /// The middle across of the label beside a bend.
-    fn beside(&self, bend: usize, across: &[f64]) -> f64 {
-        let aside = self.worded[&bend].h / 2.0 + ASIDE;
-        across[bend]
-            + if self.is_label_onwards() {
-                aside
-            } else {
-                -aside
-            }
+    /// The middle of the label beside a bend.
+    fn beside(&self, bend: usize, across: &[f64], columns: &[(f64, f64)]) -> Point {
+        let (start, end) = columns[self.layers.rank[bend]];
+        let (aside, is_onwards) = (self.worded[&bend].h / 2.0 + ASIDE, self.is_label_onwards());
+        let aside = if is_onwards { aside } else { -aside };
+        Point::new(f64::midpoint(start, end), across[bend] + aside)
     }
 
     fn gap(&self, a: usize, b: usize) -> f64 {
@@ -239,10 +224,8 @@ impl<'a> Spacing<'a> {
         let is_inside =
             |v: &usize| matches!(self.layers.kind[*v], LayerItem::Vertex | LayerItem::Bend);
         let across = rows.iter().zip(apart).filter_map(|(row, apart)| {
-            let (first, last) = (
-                row.iter().position(is_inside)?,
-                row.iter().rposition(is_inside)?,
-            );
+            let first = row.iter().position(is_inside)?;
+            let last = row.iter().rposition(is_inside)?;
             let between: f64 = apart[first..last].iter().sum();
             Some(reach(row[first]) + between + reach(row[last]))
         });
@@ -374,21 +357,13 @@ impl<'a> Spacing<'a> {
             include(&mut content[self.layers.home[v]], rect);
         }
         for (&bend, size) in &self.worded {
-            let (start, end) = columns[self.layers.rank[bend]];
-            let middle = Point::new(f64::midpoint(start, end), self.beside(bend, across));
-            include(
-                &mut content[self.layers.home[bend]],
-                Rect::around(middle, *size),
-            );
+            let label = Rect::around(self.beside(bend, across, columns), *size);
+            include(&mut content[self.layers.home[bend]], label);
         }
         let mut frames = vec![Rect::default(); self.layers.parent.len()];
         for cluster in (1..frames.len()).rev() {
-            frames[cluster] = self.frame(
-                cluster,
-                &content[cluster].unwrap_or_default(),
-                across,
-                columns,
-            );
+            let inside = content[cluster].unwrap_or_default();
+            frames[cluster] = self.frame(cluster, &inside, across, columns);
             include(&mut content[self.layers.parent[cluster]], frames[cluster]);
         }
         frames.split_off(1)

@@ -8,21 +8,21 @@ use crate::base::geometry::Size;
 use crate::base::name::last_part;
 use crate::base::time::Stamp;
 use crate::base::words;
-use crate::draw::figure::page::{FigureSheet, nothing};
-use crate::draw::figure::steps::{StepPanel, graph_width};
-use crate::draw::figure::{self, Figure, FigureKind, Latex, graph, holders, steps};
+use crate::draw::figure::steps::{self, StepPanel, graph_width};
+use crate::draw::figure::{self, Figure, FigureKind, FigureSheet, Latex, nothing};
 use crate::draw::picture::PageOptions;
 use crate::draw::scene::Scene;
+use crate::draw::timeline::FigureSource;
 use crate::draw::timeline::canvas::PX_PER_MM;
-use crate::draw::timeline::source::FigureSource;
-use crate::draw::timeline::{drawer::clock, phases::title};
+use crate::draw::timeline::drawer::clock;
+use crate::draw::timeline::notes::title;
 use crate::export::Output;
-use crate::export::options::FigureOptions;
+use crate::export::sequence::FigureOptions;
 use crate::graph::Element;
 use crate::layout::LayoutOptions;
 use crate::mission::Mission;
 use crate::mission::event_log::Detail;
-use crate::view::news::News;
+use crate::view::marked::News;
 use crate::view::{Mark, Mode, View, ViewOptions};
 
 /// The most namespaces that a remark names.
@@ -53,7 +53,7 @@ pub(super) fn draw(
     let (scene, remarks) = match options.kind {
         FigureKind::Lives => sheet.lives()?,
         FigureKind::Graph => of_graph(&sheet, drawing, watch)?,
-        FigureKind::Holders => (holders::page(&sheet)?, Vec::new()),
+        FigureKind::Holders => (figure::holders(&sheet)?, Vec::new()),
         FigureKind::Steps => (of_steps(&sheet, drawing)?, Vec::new()),
     };
     let drawn = figure::finished(&source, options, scene, remarks);
@@ -138,7 +138,7 @@ fn of_graph(
     };
     let remarks = (!folded.is_empty()).then(remark).into_iter().collect();
     let picture = composed.picture(&drawing).scene(0);
-    Ok((graph::page(sheet, picture), remarks))
+    Ok((figure::graph(sheet, picture), remarks))
 }
 
 /// The reconfigurations, one by one.
@@ -192,7 +192,7 @@ fn of_steps(sheet: &FigureSheet<'_>, drawing: &Drawing) -> Result<Scene> {
             return Err(Error::usage(format!("a step is wider than {mm} mm"), hint));
         };
         let scene = steps::page(sheet, panels, all.len() - chosen.len());
-        if figure::page::fits(&scene) {
+        if figure::fits(&scene) {
             return Ok(scene);
         }
         if chosen.len() == 1 || !sheet.options.steps.is_empty() {

@@ -20,8 +20,7 @@ use crate::gate::{
     judge, pairs, unchecked, union, update, write,
 };
 use crate::graph::window::Length;
-use crate::mission::Mission;
-use crate::mission::RATE_CHANGE;
+use crate::mission::{Mission, RATE_CHANGE};
 
 /// One report of a check or a comparison, to write to a file.
 #[derive(Clone, Debug)]

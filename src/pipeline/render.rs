@@ -7,23 +7,18 @@ use super::compose::Composed;
 use super::fit::{LARGEST, fitted};
 use super::unfolded::Opened;
 use super::{Body, Drawing, Purpose, Reading, Stage, Watch, figure, read};
-use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::words;
+use crate::base::{cast, words};
 use crate::draw::paint::raster::Painter;
 use crate::draw::picture::Picture;
 use crate::draw::strip::{SHAPES, Strip, StripSource, StripWidth, strip};
-use crate::draw::timeline::Timeline;
-use crate::draw::timeline::arranged::{by_namespace, together};
-use crate::draw::timeline::rows;
-use crate::draw::timeline::source::FigureSource;
+use crate::draw::timeline::rows::{self, by_namespace, together};
+use crate::draw::timeline::{FigureSource, Timeline};
 use crate::draw::topic_timeline::TopicTimeline;
-use crate::export::options::{self, Choice, FigureOptions};
-use crate::export::run;
-use crate::export::sequence::{Drawings, Sequence, Unfolded};
-use crate::export::{self, OneDrawing, Output, Written};
+use crate::export::sequence::{self, Choice, Drawings, FigureOptions, Sequence, Unfolded};
+use crate::export::{self, OneDrawing, Output, Written, run};
 use crate::graph::window::default_period;
 use crate::layout::LayoutOptions;
 use crate::mission::Mission;
@@ -42,7 +37,7 @@ pub struct Render {
     /// The options of the picture.
     pub drawing: Drawing,
     /// The options of the sequence.
-    pub sequence: options::SequenceOptions,
+    pub sequence: sequence::SequenceOptions,
     /// Other files and folders that are read, and never overwritten.
     pub kept: Vec<PathBuf>,
     /// The outputs to write.
@@ -61,7 +56,7 @@ impl Render {
         Ok(Self {
             reading,
             drawing: Drawing::new()?,
-            sequence: options::SequenceOptions::default(),
+            sequence: sequence::SequenceOptions::default(),
             outputs,
             still: None,
             kept: Vec::new(),

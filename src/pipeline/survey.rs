@@ -7,7 +7,7 @@ use super::collect::NOTHING_RECORDED;
 use super::{Reading, Watch, read};
 use crate::bag::{self, Input, Recording};
 use crate::base::error::{Error, Fault, Result};
-use crate::export::tables::{TableFormat, writer};
+use crate::export::tables::{self, TableFormat};
 use crate::mission::Mission;
 use crate::mission::info::{SurveyRow, survey_table};
 
@@ -16,7 +16,7 @@ use crate::mission::info::{SurveyRow, survey_table};
 /// # Errors
 /// If the format cannot represent them.
 pub fn survey_file(rows: &[SurveyRow], format: TableFormat) -> Result<Vec<u8>> {
-    writer::whole(format, &survey_table(rows))
+    tables::whole(format, &survey_table(rows))
 }
 
 /// Whether `input` is a folder of bags rather than one recording.

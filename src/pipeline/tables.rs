@@ -3,12 +3,11 @@
 mod count;
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
-use std::thread;
+use std::{fs, thread};
 
 use super::survey::{alone, recordings};
 use super::{Stage, Watch};
@@ -18,7 +17,7 @@ use crate::base::file::with_suffix;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::export::check::make_folder;
 use crate::export::sink::write_file;
-use crate::export::tables::{TableFormat, writer};
+use crate::export::tables::{self, TableFormat};
 use crate::export::target::{Target, resolved};
 pub use count::{Counted, Counting, count};
 
@@ -199,7 +198,7 @@ impl Listed {
             Ok(counted) => {
                 let target = Target::Path(self.file.clone());
                 make_folder(&target)?;
-                write_file(&target, &writer::whole(job.format, &counted.rows)?)?;
+                write_file(&target, &tables::whole(job.format, &counted.rows)?)?;
                 done.files = 1;
                 done.damaged = usize::from(counted.notices.any_loss());
                 done.messages = counted.messages;

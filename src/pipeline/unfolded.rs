@@ -4,7 +4,7 @@ use super::Drawing;
 use super::compose::Composed;
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
-use crate::draw::picture::also::MOST_LISTED;
+use crate::draw::picture::spaces::MOST_LISTED;
 use crate::draw::picture::{PageOptions, Picture};
 use crate::draw::scene::Scene;
 use crate::draw::timeline::Timeline;

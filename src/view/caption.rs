@@ -193,11 +193,8 @@ impl<'a> CaptionWriter<'a> {
     }
 
     fn moment(&self, at: Stamp) -> String {
-        words::moment(
-            at.since(self.start)
-                .div_euclid(SECOND)
-                .saturating_mul(SECOND),
-        )
+        let seconds = at.since(self.start).div_euclid(SECOND);
+        words::moment(seconds.saturating_mul(SECOND))
     }
 
     /// The living subscribers without messages while a node is away: `a, b get no detections`; `None` if none is known.
@@ -218,10 +215,8 @@ impl<'a> CaptionWriter<'a> {
             _ => "get",
         };
         let topic = self.name(Element::Topic(topic));
-        Some(format!(
-            "{} {gets} no {topic}",
-            words::some_of(&names, MOST_NAMED)
-        ))
+        let names = words::some_of(&names, MOST_NAMED);
+        Some(format!("{names} {gets} no {topic}"))
     }
 
     /// Of the topics that only a node (or other runs of it) publishes, the one with most subscribers, and these subscribers:
@@ -382,13 +377,12 @@ struct Said {
 
 impl Said {
     fn new(rank: u8, sign: char, name: String, tail: &str) -> Self {
-        let (lead, tail) = (String::new(), tail.to_owned());
         Self {
             rank,
             sign,
-            lead,
+            lead: String::new(),
             name,
-            tail,
+            tail: tail.to_owned(),
         }
     }
 

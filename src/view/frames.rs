@@ -7,9 +7,8 @@ use super::caption::{CaptionWriter, STILL_AWAY};
 use super::items::Viewed;
 use super::listed::beginning;
 use super::marked::{OngoingEvents, WindowChanges, WindowMarks};
-use super::shown::{ShownRuns, ShownRunsWriter};
+use super::shown::{Lengths, ShownRuns, ShownRunsWriter, stable};
 use super::state::{Alive, Lifetimes, LivingItems, Now};
-use super::steady::{Lengths, stable};
 use super::{ArrowId, Counts, ItemId, Mark, MemberState, OngoingEvent, Shown, ViewOptions};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{ById, Element, Id};
@@ -256,10 +255,8 @@ impl<'a> ShownWindows<'a> {
                 // A node that restarts keeps its arrows, even if it is away when the window ends.
                 let is_back = |end: &Shown| matches!(end.mark, Some(Mark::Restarted | Mark::Away));
                 let is_kept = is_back(from) || is_back(to);
-                let there = (
-                    changes.before.arrows[id],
-                    changes.after.arrows[id] || is_kept,
-                );
+                let stays = changes.after.arrows[id] || is_kept;
+                let there = (changes.before.arrows[id], stays);
                 let ends = [from, to].map(|end| Some((end.mark, &end.events[..])));
                 if there != (false, false) || self.met(id, span) {
                     shown = changes.arrow(now, id, there, ends);
@@ -281,10 +278,8 @@ impl<'a> ShownWindows<'a> {
                 unlined[sender].insert(Arc::clone(topic));
             }
         }
-        self.unlined = unlined
-            .into_iter()
-            .map(|all| all.into_iter().collect())
-            .collect();
+        let unlined = unlined.into_iter();
+        self.unlined = unlined.map(|all| all.into_iter().collect()).collect();
         for ((id, shown), unlined) in self.viewed.items.ids().zip(items).zip(&self.unlined) {
             let shown = shown.map(|shown| Shown {
                 unlined: unlined.clone(),
@@ -462,11 +457,8 @@ impl Frame {
 
     /// Whether an event or an interruption begins in it, or an event ends.
     pub fn is_changed(&self) -> bool {
-        let is_interrupted = self
-            .caption
-            .iter()
-            .flat_map(|p| &p.events)
-            .any(Vec::is_empty);
+        let mut events = self.caption.iter().flat_map(|p| &p.events);
+        let is_interrupted = events.any(Vec::is_empty);
         let mut ongoing = self.ongoing.iter();
         is_interrupted || !self.headlines.is_empty() || ongoing.any(|l| l.ended.is_some())
     }

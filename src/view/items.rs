@@ -5,8 +5,7 @@ use std::sync::Arc;
 
 use super::choose::{Selection, finish, is_debug_label, select};
 use super::fold::equal::Fleets;
-use super::fold::topics::{self, Groups};
-use super::fold::{Boxes, ItemKey, alike, roles};
+use super::fold::{self, Boxes, Groups, ItemKey};
 use super::listed::{self, Words};
 use super::{Arrow, ArrowId, ArrowKind, Grouping, Item, ItemId, ItemKind, Mode, ViewOptions};
 use crate::base::name::last_part;
@@ -57,14 +56,6 @@ pub(crate) struct Viewed<'a> {
 /// of both has millions, far too many to read.
 const MOST_PAIRS: usize = 200_000;
 
-/// The fleets to draw as one: none if exact names or separate boxes are requested.
-fn fleets(elements: &Elements, options: &ViewOptions) -> Fleets {
-    if options.exact_names || options.group == Grouping::NONE {
-        return Fleets::default();
-    }
-    Fleets::new(elements, options)
-}
-
 /// The boxes that an arrow connects, and its kind: edges with the same ends are in one arrow.
 type ArrowEnds = (ItemId, ItemId, ArrowKind);
 
@@ -81,7 +72,7 @@ impl<'a> Viewed<'a> {
             _ => options.group,
         };
         let seen: ById<TopicId, bool> = selection.topics.iter().map(Option::is_none).collect();
-        let groups = topics::groups(elements, &seen, grouping);
+        let groups = fold::groups(elements, &seen, grouping);
         let mut grouped = ById::like(&elements.topics, false);
         for id in groups.values().flatten() {
             grouped[*id] = true;
@@ -95,7 +86,12 @@ impl<'a> Viewed<'a> {
             elements,
             is_sent,
             selection,
-            fleets: fleets(elements, options),
+            // None if exact names or separate boxes are requested.
+            fleets: if options.exact_names || options.group == Grouping::NONE {
+                Fleets::default()
+            } else {
+                Fleets::new(elements, options)
+            },
             items: ById::default(),
             arrows: ById::default(),
             places: PerElement::new(elements, |_| Place::Hidden),
@@ -112,7 +108,7 @@ impl<'a> Viewed<'a> {
         };
         viewed.set_items(mission, options, &groups);
         if options.mode.is_direct() {
-            viewed.bundled = topics::on_lines(elements, &groups);
+            viewed.bundled = fold::on_lines(elements, &groups);
             viewed.set_direct(options);
         }
         if !options.mode.is_direct() || options.is_bundled {
@@ -172,16 +168,13 @@ impl<'a> Viewed<'a> {
             }
         }
         if !options.alike_in.is_empty() {
-            for item in self
-                .items
-                .iter_mut()
-                .filter(|item| item.kind == ItemKind::Node)
-            {
-                item.others = alike::others(elements, &item.name, &item.members);
+            let items = self.items.iter_mut();
+            for item in items.filter(|item| item.kind == ItemKind::Node) {
+                item.others = fold::others(elements, &item.name, &item.members);
             }
         }
         if !options.exact_names {
-            roles::label(&mut self.items, elements);
+            fold::label(&mut self.items, elements);
         }
     }
 

@@ -115,13 +115,9 @@ pub(crate) fn none_pass(flag: &str, filter: &NameFilter, names: &[&str]) -> Opti
     let passes = |name: &&str| filter.passes(name);
     let is_unfit = !filter.passes_all() && !names.is_empty() && !names.iter().any(passes);
     is_unfit.then(|| {
-        Error::usage(
-            format!(
-                "`{flag}` matches none of {}",
-                words::count(names.len(), "name")
-            ),
-            meant(&filter.wanted(), names),
-        )
+        let many = words::count(names.len(), "name");
+        let what = format!("`{flag}` matches none of {many}");
+        Error::usage(what, meant(&filter.wanted(), names))
     })
 }
 
@@ -130,10 +126,8 @@ pub(crate) fn unmatched(elements: &Elements, options: &ViewOptions) -> Vec<Notic
     let [nodes, topics] = names(elements);
     let both: Vec<&str> = nodes.iter().chain(&topics).copied().collect();
     let without = |spaces: &[Arc<str>]| -> Vec<String> {
-        let is_used = |space: &&Arc<str>| {
-            both.iter()
-                .any(|name| is_within(name, space.trim_end_matches('/')))
-        };
+        let is_in = |name: &&str, space: &str| is_within(name, space.trim_end_matches('/'));
+        let is_used = |space: &&Arc<str>| both.iter().any(|name| is_in(name, space));
         let unused = spaces.iter().filter(|space| !is_used(space));
         unused.map(ToString::to_string).collect()
     };

@@ -195,10 +195,7 @@ impl<'a> Now<'a> {
     fn waits_for(&self, what: Element) -> Option<TopicId> {
         let (_, topic) = self.mission.elements.ends(what);
         let first = self.mission.elements.topics.get(topic?)?.seen.first;
-        let row = self
-            .rows
-            .of(Element::Topic(topic?))
-            .and_then(Option::as_ref);
+        let row = self.rows.of(Element::Topic(topic?))?.as_ref();
         let is_latched = row.is_some_and(|row| row.state == State::Latched);
         topic.filter(|_| !is_latched && first.is_some_and(|first| first >= self.span.end))
     }
@@ -325,10 +322,8 @@ impl<'a> Now<'a> {
             ) else {
                 continue;
             };
-            let row = self
-                .viewed
-                .row(arrow, (*publish, *subscribe))
-                .filter(|_| is_bundle);
+            let row = self.viewed.row(arrow, (*publish, *subscribe));
+            let row = row.filter(|_| is_bundle);
             if let Some((topic, way)) = row {
                 rows.entry(topic).or_default().1[way] = true;
             }
@@ -336,7 +331,8 @@ impl<'a> Now<'a> {
             if is_bundle && last.replace(publish) == Some(publish) {
                 continue;
             }
-            let topic = self.mission.elements.ends(Element::Subscribe(*subscribe)).1;
+            let received = Element::Subscribe(*subscribe);
+            let topic = self.mission.elements.ends(received).1;
             let is_new = topic.is_some_and(|topic| carried.insert(topic));
             // The rate of the whole topic counts once, regardless of the number of publishers.
             let topic = topic.filter(|_| is_new || !is_bundle);
@@ -350,11 +346,7 @@ impl<'a> Now<'a> {
             };
             gather(&mut slot, id.0, joined.clone());
             if let Some((topic, _)) = row {
-                if self
-                    .mission
-                    .elements
-                    .is_service(Element::Subscribe(*subscribe))
-                {
+                if self.mission.elements.is_service(received) {
                     services.insert(topic);
                 }
                 gather(&mut rows.entry(topic).or_default().0, topic, joined);

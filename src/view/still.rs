@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::steady::Lengths;
+use super::shown::Lengths;
 use super::{
     Arrow, ArrowKind, Counts, Frame, Item, ItemId, Mark, Phrase, SeenWindow, Shown, ShownRuns,
     TopicRow, View, sum as added,
@@ -33,32 +33,24 @@ pub struct Presence {
 pub(super) fn still(mut view: View, mission: &Mission) -> View {
     let lengths = Lengths::new(view.frames.iter().map(|f| f.span));
     let rates = StillRates(Rates::new(mission));
+    let join = |looks: &mut ShownRuns, rated: &dyn Fn(Shown) -> Shown| {
+        let shown = whole(looks, &lengths).map(rated);
+        *looks = ShownRuns::of([shown.as_ref()]);
+    };
     for row in &mut view.rows {
-        let shown = whole(&row.shown, &lengths).map(|shown| {
-            if row.is_infrastructure {
-                shown
-            } else {
-                rates.of_topics(&row.item.members, shown)
-            }
-        });
-        row.shown = ShownRuns::of([shown.as_ref()]);
+        // The topics of a hub carry more than a row of it.
+        let members = Some(&row.item.members[..]).filter(|_| !row.is_infrastructure);
+        let members = members.unwrap_or_default();
+        join(&mut row.shown, &|shown| rates.of_topics(members, shown));
     }
     let also = view.also.iter_mut();
     let also = also.flat_map(|also| also.items.iter().zip(&mut also.shown));
-    for (item, looks) in view
-        .items
-        .iter()
-        .zip(view.items_shown.iter_mut())
-        .chain(also)
-    {
-        let shown = whole(looks, &lengths);
-        let shown = shown.map(|shown| rates.of_topics(&item.members, shown));
-        *looks = ShownRuns::of([shown.as_ref()]);
+    let items = view.items.iter().zip(view.items_shown.iter_mut());
+    for (item, looks) in items.chain(also) {
+        join(looks, &|shown| rates.of_topics(&item.members, shown));
     }
     for (arrow, looks) in view.arrows.iter().zip(view.arrows_shown.iter_mut()) {
-        let shown = whole(looks, &lengths);
-        let shown = shown.map(|shown| rates.of_line(arrow, shown));
-        *looks = ShownRuns::of([shown.as_ref()]);
+        join(looks, &|shown| rates.of_line(arrow, shown));
     }
     let marks = marks(mission);
     let items = view.items.iter();

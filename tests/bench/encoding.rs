@@ -24,9 +24,9 @@ use bagreel::internals::draw::strip::{StripSource, StripWidth, strip};
 use bagreel::internals::draw::style::Style;
 use bagreel::internals::draw::text::Fonts;
 use bagreel::internals::export::Output;
-use bagreel::internals::export::options::{Choice, SequenceOptions};
 use bagreel::internals::export::run;
 use bagreel::internals::export::sequence::Sequence;
+use bagreel::internals::export::sequence::{Choice, SequenceOptions};
 use bagreel::internals::view::{ViewOptions, view};
 use bagreel::internals::{layout, mission};
 

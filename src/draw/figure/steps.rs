@@ -1,6 +1,6 @@
 //! Steps: a panel per reconfiguration with only what changes and its direct partners, in order of time.
 
-use super::page::FigureSheet;
+use super::FigureSheet;
 use crate::base::geometry::{Point, Rect, Size};
 use crate::base::words;
 use crate::draw::scene::{Scene, Stroke};

@@ -4,9 +4,9 @@ use std::path::{Component, Path, PathBuf};
 
 use super::{FigureKind, FigureOptions};
 use crate::base::words;
+use crate::draw::timeline::FigureSource;
 use crate::draw::timeline::drawer::clock;
-use crate::draw::timeline::phases::title;
-use crate::draw::timeline::source::FigureSource;
+use crate::draw::timeline::notes::title;
 
 /// The caption: the content, the phases with their times, bag and length, the legend in words.
 pub(crate) fn caption(

@@ -24,10 +24,8 @@ pub(crate) struct AnimatedScenes {
     times: Vec<u32>,
 }
 
-/// The looks of a group at one position in the painting order.
-struct Slot {
-    looks: Vec<(Group, Vec<usize>)>,
-}
+/// The looks of a group at one position in the painting order, each with its scenes.
+type Slot = Vec<(Group, Vec<usize>)>;
 
 impl AnimatedScenes {
     /// The scenes with the times for which they are shown, in milliseconds. All have the same size; tooltips,
@@ -61,18 +59,17 @@ impl AnimatedScenes {
                 slot
             } else {
                 let slot = self.slots.len();
-                self.slots.push(Slot { looks: Vec::new() });
+                self.slots.push(Slot::new());
                 self.of.entry(group.id.clone()).or_default().push(slot);
                 self.order.insert(next, slot);
-                place
-                    .iter_mut()
-                    .filter(|at| **at >= next)
-                    .for_each(|at| *at += 1);
+                for at in place.iter_mut().filter(|at| **at >= next) {
+                    *at += 1;
+                }
                 place.push(next);
                 slot
             };
             next = place[slot] + 1;
-            let looks = &mut self.slots[slot].looks;
+            let looks = &mut self.slots[slot];
             match looks.iter_mut().rev().find(|(look, _)| *look == group) {
                 Some((_, scenes)) => scenes.push(at),
                 None => looks.push((group, vec![at])),
@@ -94,7 +91,7 @@ impl AnimatedScenes {
         xml.close().raw("\n");
         svg::ground(&mut xml, &self.first);
         for slot in self.order.iter().map(|slot| &self.slots[*slot]) {
-            for (k, (group, scenes)) in slot.looks.iter().enumerate() {
+            for (k, (group, scenes)) in slot.iter().enumerate() {
                 self.look(&mut xml, (k, group), (scenes, still), &fonts);
             }
         }
@@ -206,7 +203,7 @@ mod tests {
         let order: Vec<&str> = film
             .order
             .iter()
-            .map(|slot| film.slots[*slot].looks[0].0.id.as_str())
+            .map(|slot| film.slots[*slot][0].0.id.as_str())
             .collect();
         assert_eq!(order, ["a", "b", "a", "c"]);
     }

@@ -1,21 +1,17 @@
 //! A scene as pixels: its SVG, group by group, through usvg and resvg with the bundled font only.
 
-mod canvas;
-mod drawn;
-mod tiles;
-
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::{Arc, PoisonError, RwLock};
 
 use resvg::usvg::{self, Tree, fontdb};
+use tiny_skia::{Pixmap, PixmapMut, Transform};
 
-pub use self::canvas::{Canvas, DrawnScene};
-use self::drawn::Drawn;
-use self::tiles::Tiles;
+use super::svg;
 use crate::base::cast;
 use crate::base::error::{Error, Result};
-use crate::draw::paint::svg;
-use crate::draw::scene::{Group, Scene};
+use crate::base::geometry::{Point, Rect, Size, after};
+use crate::draw::scene::{Form, Group, Piece, Scene, Shape, Step, Text};
 use crate::draw::style::Color;
 use crate::draw::text::Fonts;
 
@@ -136,7 +132,10 @@ impl Painter {
         })?;
         let tiles = Tiles::under(group, scene.size, &self.fonts);
         let page = (sheet.pixels.width, sheet.pixels.height);
-        let drawn = Drawn::new(tree, sheet.scale, page);
+        let drawn = match GroupPixels::of(&tree, sheet.scale, page) {
+            Some(pixels) => Drawn::Pixels(pixels),
+            None => Drawn::Tree(Box::new(tree)),
+        };
         let group = Arc::new(RasterGroup { drawn, tiles });
         let mut kept = self.kept.write().unwrap_or_else(PoisonError::into_inner);
         kept.insert(text, Arc::clone(&group), sheet.scale);
@@ -216,6 +215,481 @@ fn fill(rgba: &mut [u8], background: Color) {
 fn opaque(color: Color) -> [u8; 4] {
     let [r, g, b] = color.rgb().unwrap_or([255; 3]);
     [r, g, b, 255]
+}
+
+// Groups as they are composited onto pages: small ones as cached pixels, large ones as a tree to draw each
+// time.
+
+/// The largest number of pixels of a group that is cached as pixels: a box with its words has about ten
+/// thousand.
+const MOST_CACHED: f64 = 65_536.0;
+/// Pixels around a group's box, for soft edges.
+const MARGIN: f64 = 2.0;
+
+/// A group in pixels of the page.
+enum Drawn {
+    Pixels(GroupPixels),
+    Tree(Box<Tree>),
+}
+
+/// The pixels of a group that are not transparent: most of the area around lines is.
+struct GroupPixels {
+    runs: Vec<Run>,
+    /// Premultiplied red, green, blue and alpha, run by run.
+    rgba: Vec<u8>,
+}
+
+/// Pixels side by side.
+struct Run {
+    /// The number of pixels of the page before it.
+    at: usize,
+    length: usize,
+}
+
+impl Drawn {
+    /// The number of cached bytes of its pixels.
+    fn bytes(&self) -> usize {
+        match self {
+            Self::Pixels(pixels) => pixels.rgba.len() + size_of_val(&*pixels.runs),
+            Self::Tree(_) => 0,
+        }
+    }
+
+    /// Composites the group onto a page of opaque pixels.
+    fn lay(&self, scale: f64, page: &mut Pixels) {
+        match self {
+            Self::Pixels(pixels) => pixels.lay(page),
+            Self::Tree(tree) => {
+                if let Some(mut map) =
+                    PixmapMut::from_bytes(&mut page.rgba, page.width, page.height)
+                {
+                    resvg::render(tree, scaled(scale), &mut map);
+                }
+            }
+        }
+    }
+}
+
+impl GroupPixels {
+    /// The pixels of the group of `tree` on a page of `page` pixels, `scale` times as large as its own size; `None` if there
+    /// are too many.
+    fn of(tree: &Tree, scale: f64, page: (u32, u32)) -> Option<Self> {
+        let area = tree.root().abs_layer_bounding_box();
+        let inside = |at: f64, most: u32| at.clamp(0.0, f64::from(most));
+        let low = |at: f32, most| inside(libm::floor(f64::from(at) * scale - MARGIN), most);
+        let high = |at: f32, most| inside(libm::ceil(f64::from(at) * scale + MARGIN), most);
+        let (left, right) = (low(area.left(), page.0), high(area.right(), page.0));
+        let (top, bottom) = (low(area.top(), page.1), high(area.bottom(), page.1));
+        let (width, height) = (right - left, bottom - top);
+        if width * height > MOST_CACHED {
+            return None;
+        }
+        let [left, top, width, height] = [left, top, width, height].map(cast::to_u32);
+        let mut map = Pixmap::new(width, height)?;
+        #[expect(clippy::cast_precision_loss, reason = "at most 65,535")]
+        let moved = scaled(scale).post_translate(-(left as f32), -(top as f32));
+        resvg::render(tree, moved, &mut map.as_mut());
+        Some(Self::inked(
+            &map,
+            (left as usize, top as usize),
+            page.0 as usize,
+        ))
+    }
+
+    /// The pixels of `map` that are not transparent; its corner is at this column and row of a page `across`
+    /// pixels wide.
+    fn inked(map: &Pixmap, (left, top): (usize, usize), across: usize) -> Self {
+        let (mut runs, mut rgba) = (Vec::new(), Vec::new());
+        let rows = map.data().chunks_exact(map.width() as usize * 4);
+        for (row, y) in rows.zip(top..) {
+            let mut x = left + y * across;
+            for run in row
+                .as_chunks::<4>()
+                .0
+                .chunk_by(|a, b| (a[3] == 0) == (b[3] == 0))
+            {
+                if run[0][3] != 0 {
+                    runs.push(Run {
+                        at: x,
+                        length: run.len(),
+                    });
+                    rgba.extend_from_slice(run.as_flattened());
+                }
+                x += run.len();
+            }
+        }
+        Self { runs, rgba }
+    }
+
+    fn lay(&self, page: &mut Pixels) {
+        let mut from = &self.rgba[..];
+        for run in &self.runs {
+            let (now, later) = from.split_at(run.length * 4);
+            let to = &mut page.rgba[run.at * 4..(run.at + run.length) * 4];
+            for (to, from) in to.chunks_exact_mut(4).zip(now.chunks_exact(4)) {
+                match from[3] {
+                    255 => to.copy_from_slice(from),
+                    alpha => over(to, from, 255 - alpha),
+                }
+            }
+            from = later;
+        }
+    }
+}
+
+/// Composites a premultiplied pixel over an opaque one.
+fn over(to: &mut [u8], from: &[u8], rest: u8) {
+    for (to, from) in to.iter_mut().zip(&from[..3]) {
+        let under = u32::from(*to) * u32::from(rest) + 128;
+        // Division by 255, rounded.
+        let under = (under + (under >> 8)) >> 8;
+        *to = from.saturating_add(u8::try_from(under).unwrap_or(u8::MAX));
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "a scale near 1")]
+fn scaled(scale: f64) -> Transform {
+    Transform::from_scale(scale as f32, scale as f32)
+}
+
+// Frames one after another: only changed parts are redrawn, with the same pixels as a full redraw.
+
+/// The largest share of changed tiles; above it, everything is redrawn, since clipping then costs more than it saves.
+const MOST_SHARE: f64 = 0.7;
+
+/// A scene with its pixels.
+pub struct DrawnScene<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its pixels; none if it was not drawn.
+    pub pixels: &'a Pixels,
+    sheet: Option<(&'a PixelSheet, Option<&'a Tiles>)>,
+}
+
+impl<'a> DrawnScene<'a> {
+    /// A scene that was not drawn.
+    pub fn without_pixels(scene: &'a Scene) -> Self {
+        const NOTHING: &Pixels = &Pixels {
+            width: 0,
+            height: 0,
+            rgba: Vec::new(),
+        };
+        Self {
+            scene,
+            pixels: NOTHING,
+            sheet: None,
+        }
+    }
+
+    /// The bytes of the pixels that may differ from those of the scene before, from top to bottom.
+    pub fn changed(&self) -> impl Iterator<Item = Range<usize>> + use<> {
+        let rows = self
+            .sheet
+            .and_then(|(sheet, dirty)| Some(sheet.rows(dirty?)));
+        let all = rows.is_none().then_some(0..self.pixels.rgba.len());
+        all.into_iter().chain(rows.into_iter().flatten())
+    }
+}
+
+/// A page on which frames are drawn one after another; it stores the last one.
+pub struct Canvas<'a> {
+    painter: &'a Painter,
+    scale: f64,
+    last: Option<Last>,
+}
+
+struct Last {
+    scene: Scene,
+    drawn: Vec<Arc<RasterGroup>>,
+    sheet: PixelSheet,
+    scratch: PixelSheet,
+    /// The tiles that differ from the previous scene; `None` for all of them.
+    dirty: Option<Tiles>,
+}
+
+impl<'a> Canvas<'a> {
+    /// An empty canvas; scenes on it are `scale` times as large.
+    pub fn new(painter: &'a Painter, scale: f64) -> Self {
+        Self {
+            painter,
+            scale,
+            last: None,
+        }
+    }
+
+    /// The scene in pixels, equal to [`Painter::paint`]; fast if little differs from the previous scene.
+    ///
+    /// # Errors
+    /// As [`Painter::paint`].
+    pub fn draw(&mut self, scene: Scene) -> Result<DrawnScene<'_>> {
+        let last = match self.last.take() {
+            Some(last) => last.followed_by(scene, self.painter)?,
+            None => Last::first(scene, self.painter, self.scale)?,
+        };
+        let last = self.last.insert(last);
+        Ok(DrawnScene {
+            scene: &last.scene,
+            pixels: &last.sheet.pixels,
+            sheet: Some((&last.sheet, last.dirty.as_ref())),
+        })
+    }
+}
+
+impl Last {
+    fn first(scene: Scene, painter: &Painter, scale: f64) -> Result<Self> {
+        let mut drawn = Vec::with_capacity(scene.groups.len());
+        Ok(Self {
+            sheet: PixelSheet::covered(painter, &scene, scale, |group| drawn.push(group))?,
+            scratch: PixelSheet::of(&scene, scale)?,
+            scene,
+            drawn,
+            dirty: None,
+        })
+    }
+
+    /// Redraws the parts that differ, or everything if there are too many.
+    fn followed_by(mut self, scene: Scene, painter: &Painter) -> Result<Self> {
+        if scene.size != self.scene.size || scene.background != self.scene.background {
+            return Self::first(scene, painter, self.sheet.scale);
+        }
+        let stays = self.stays(&scene);
+        let groups = scene.groups.iter().zip(&stays);
+        let drawn = groups.map(|(group, stays)| match stays {
+            Some(at) => Ok(Arc::clone(&self.drawn[*at])),
+            None => painter.read(&scene, group, &self.sheet),
+        });
+        let drawn: Vec<_> = drawn.collect::<Result<_>>()?;
+        let dirty = self.dirty(&scene, &drawn, &stays);
+        match &dirty {
+            Some(dirty) => self.mend(&scene, &drawn, dirty),
+            None => self.sheet.cover(&scene, &drawn),
+        }
+        Ok(Self {
+            scene,
+            drawn,
+            dirty,
+            ..self
+        })
+    }
+
+    /// Draws the groups that overlap these tiles, and copies only these tiles.
+    fn mend(&mut self, scene: &Scene, drawn: &[Arc<RasterGroup>], dirty: &Tiles) {
+        self.scratch.clear(dirty, scene);
+        for group in drawn.iter().filter(|d| d.tiles.meets(dirty)) {
+            self.scratch.draw(group);
+        }
+        self.sheet.copy(dirty, &self.scratch);
+    }
+
+    /// The index in the previous scene of each group that is equal there.
+    fn stays(&self, scene: &Scene) -> Vec<Option<usize>> {
+        let ids = self.scene.groups.iter().map(|group| group.id.as_str());
+        let before: HashMap<&str, usize> = ids.zip(0..).collect();
+        let same = |group: &Group| {
+            let at = before.get(group.id.as_str()).copied();
+            at.filter(|at| self.scene.groups[*at] == *group)
+        };
+        scene.groups.iter().map(same).collect()
+    }
+
+    /// The tiles under everything that differs; `None` if everything must be redrawn.
+    fn dirty(
+        &self,
+        scene: &Scene,
+        drawn: &[Arc<RasterGroup>],
+        stays: &[Option<usize>],
+    ) -> Option<Tiles> {
+        // Unchanged groups must keep their order, or overlaps would differ.
+        if !stays.iter().flatten().is_sorted() {
+            return None;
+        }
+        let mut dirty = Tiles::none(scene.size);
+        let new = drawn.iter().zip(stays).filter(|(_, stays)| stays.is_none());
+        new.for_each(|(drawn, _)| dirty.extend(&drawn.tiles));
+        let mut is_gone = vec![true; self.drawn.len()];
+        stays.iter().flatten().for_each(|at| is_gone[*at] = false);
+        let gone = self.drawn.iter().zip(&is_gone).filter(|(_, gone)| **gone);
+        gone.for_each(|(drawn, _)| dirty.extend(&drawn.tiles));
+        (dirty.share() <= MOST_SHARE).then_some(dirty)
+    }
+}
+
+impl PixelSheet {
+    /// The byte range of each row of pixels inside the tiles.
+    fn rows(&self, tiles: &Tiles) -> impl Iterator<Item = Range<usize>> + use<> {
+        let (width, height) = (self.pixels.width as usize, self.pixels.height as usize);
+        let scale = self.scale;
+        let edge = move |tile: usize, most: usize| {
+            cast::to_usize(libm::floor(tile as f64 * SIDE * scale).min(most as f64))
+        };
+        tiles.spans().into_iter().flat_map(move |(columns, row)| {
+            let (left, right) = (edge(columns.start, width), edge(columns.end, width));
+            let lines = edge(row, height)..edge(row + 1, height);
+            lines.map(move |y| (y * width + left) * 4..(y * width + right) * 4)
+        })
+    }
+
+    fn clear(&mut self, tiles: &Tiles, scene: &Scene) {
+        for row in self.rows(tiles) {
+            fill(&mut self.pixels.rgba[row], scene.background);
+        }
+    }
+
+    fn copy(&mut self, tiles: &Tiles, from: &Self) {
+        for row in self.rows(tiles) {
+            self.pixels.rgba[row.clone()].copy_from_slice(&from.pixels.rgba[row]);
+        }
+    }
+}
+
+// The parts of the page that a group may touch: a bit per square of the page, never too few.
+
+/// The side of a tile in pixels of the page: about the height of a box.
+const SIDE: f64 = 32.0;
+
+/// A set of tiles of one page.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Tiles {
+    columns: usize,
+    rows: usize,
+    bits: Vec<u64>,
+}
+
+impl Tiles {
+    /// None of the tiles of a page of this size.
+    fn none(page: Size) -> Self {
+        let count = |length: f64| tile(length.min(1e6)) + 1;
+        let (columns, rows) = (count(page.w), count(page.h));
+        Self {
+            columns,
+            rows,
+            bits: vec![0; (columns * rows).div_ceil(64)],
+        }
+    }
+
+    /// The tiles that the group may touch.
+    fn under(group: &Group, page: Size, fonts: &Fonts) -> Self {
+        let mut tiles = Self::none(page);
+        for piece in &group.pieces {
+            match piece {
+                Piece::Shape(shape) => tiles.add_shape(shape),
+                Piece::Text(text) => tiles.add(text_box(text, fonts)),
+            }
+        }
+        tiles
+    }
+
+    /// Adds all tiles of `other`, which is of the same page.
+    fn extend(&mut self, other: &Self) {
+        for (a, b) in self.bits.iter_mut().zip(&other.bits) {
+            *a |= b;
+        }
+    }
+
+    /// Whether a tile is in both.
+    fn meets(&self, other: &Self) -> bool {
+        self.bits.iter().zip(&other.bits).any(|(a, b)| a & b != 0)
+    }
+
+    /// The share of the page that is in it, 0..=1.
+    fn share(&self) -> f64 {
+        let set: u32 = self.bits.iter().map(|b| b.count_ones()).sum();
+        f64::from(set) / (self.columns * self.rows) as f64
+    }
+
+    /// The tiles in it, row by row: the columns of those side by side, and their row.
+    fn spans(&self) -> Vec<(Range<usize>, usize)> {
+        let mut spans: Vec<(Range<usize>, usize)> = Vec::new();
+        for (column, row) in self.iter() {
+            match spans.last_mut() {
+                Some((columns, at)) if *at == row && columns.end == column => columns.end += 1,
+                _ => spans.push((column..column + 1, row)),
+            }
+        }
+        spans
+    }
+
+    /// The tiles in it as (column, row), row by row.
+    fn iter(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let all = (0..self.rows).flat_map(|row| (0..self.columns).map(move |column| (column, row)));
+        all.filter(|(column, row)| {
+            let at = row * self.columns + column;
+            self.bits[at / 64] >> (at % 64) & 1 == 1
+        })
+    }
+
+    fn add(&mut self, area: Rect) {
+        let (left, right) = (tile(area.x), tile(area.right()).min(self.columns - 1));
+        let (top, bottom) = (tile(area.y), tile(area.bottom()).min(self.rows - 1));
+        for row in top..=bottom {
+            for at in row * self.columns + left..=row * self.columns + right {
+                if left <= right {
+                    self.bits[at / 64] |= 1 << (at % 64);
+                }
+            }
+        }
+    }
+
+    fn add_shape(&mut self, shape: &Shape) {
+        // Half the width, up to four times that at a pointed corner, and more for antialiasing and rounding.
+        let reach = shape.stroke.width.max(0.0) * 2.0 + 3.0;
+        match &shape.form {
+            Form::Rect(rect, _) | Form::Ellipse(rect) => self.add(rect.grown(reach)),
+            Form::Path(steps) if shape.fill == Color::NONE => self.add_line(steps, reach),
+            Form::Path(steps) => {
+                let points = steps.iter().flat_map(Step::points).copied();
+                if let Some(area) = Rect::of_points(points) {
+                    self.add(area.grown(reach));
+                }
+            }
+        }
+    }
+
+    fn add_line(&mut self, steps: &[Step], reach: f64) {
+        let (mut first, mut here) = (Point::default(), Point::default());
+        for step in steps {
+            let curve = match step {
+                Step::Move(p) => {
+                    (first, here) = (*p, *p);
+                    continue;
+                }
+                Step::Line(p) => [here, here, *p, *p],
+                Step::Curve([a, b, end]) => [here, *a, *b, *end],
+                Step::Close => [here, here, first, first],
+            };
+            self.add_curve(curve, reach, 5);
+            here = curve[3];
+        }
+    }
+
+    /// Adds the tiles of a curve, which lies inside the box of its controls: it is halved until that box is small.
+    fn add_curve(&mut self, curve: [Point; 4], reach: f64, depth: u8) {
+        let Some(area) = Rect::of_points(curve) else {
+            return;
+        };
+        if depth == 0 || (area.w < SIDE && area.h < SIDE) {
+            self.add(area.grown(reach));
+            return;
+        }
+        let mut backwards = curve;
+        backwards.reverse();
+        self.add_curve(after(curve, 0.5), reach, depth - 1);
+        self.add_curve(after(backwards, 0.5), reach, depth - 1);
+    }
+}
+
+/// The tile index of a coordinate; coordinates before the page are in the first tile.
+fn tile(at: f64) -> usize {
+    cast::to_usize((at / SIDE).clamp(0.0, 1e6))
+}
+
+fn text_box(text: &Text, fonts: &Fonts) -> Rect {
+    let width = fonts.width(&text.text, text.size, text.weight);
+    let left = text.at.x - text.anchor.before(width);
+    let halo = text.halo.map_or(0.0, |(_, width)| width);
+    // Above and below any letter of our fonts; half an em on each side for overhanging letters.
+    Rect::new(left, text.at.y - 1.3 * text.size, width, 1.8 * text.size)
+        .grown(0.5 * text.size + halo + 3.0)
 }
 
 #[cfg(test)]

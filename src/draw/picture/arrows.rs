@@ -1,10 +1,8 @@
 //! Publications and subscriptions: their routes, rates and signs of change.
 
-use super::ids::{class, reported};
 use super::options::{self, ArrowLook};
-use super::page::{GraphFit, GraphPen};
-use super::texts::{LINE, arrow_label};
-use super::{badge, texts, topics};
+use super::texts::{self, LINE, arrow_label, class, reported};
+use super::{GraphFit, GraphPen, badge};
 use crate::base::geometry::{Point, Rect, Size, after, on_cubic, polyline};
 use crate::draw::scene::{Anchor, Font, Form, Group, Shape, Step, Stroke, Text, polygon};
 use crate::draw::style::Color;
@@ -269,11 +267,8 @@ impl GraphPen<'_> {
         };
         let (mut start, mut curves) = (track.route.start, track.route.curves.clone());
         if let Some(end) = curves.last_mut().filter(|_| heads[0]) {
-            *end = [
-                end[0],
-                back(end[1], along, short * 0.5),
-                back(end[2], along, short),
-            ];
+            end[1] = back(end[1], along, short * 0.5);
+            end[2] = back(end[2], along, short);
         }
         if let Some(end) = curves.first_mut().filter(|_| heads[1]) {
             start = back(start, against, short);
@@ -289,19 +284,14 @@ impl GraphPen<'_> {
         }
         group.shape(Shape::line(path, stroke));
         let tips = [(end, along), (track.route.start, against)];
-        for (tip, along) in tips
-            .into_iter()
-            .zip(heads)
-            .filter_map(|(tip, is)| is.then_some(tip))
-        {
+        let tips = tips.into_iter().zip(heads);
+        for (tip, along) in tips.filter_map(|(tip, is)| is.then_some(tip)) {
             group.shape(Shape::filled(kind.form(tip, along, head), color));
         }
         if look.dot {
             let dot = Size::new(5.0 * scale, 5.0 * scale);
-            group.shape(Shape::filled(
-                Form::Ellipse(Rect::around(track.route.start, dot)),
-                color,
-            ));
+            let dot = Form::Ellipse(Rect::around(track.route.start, dot));
+            group.shape(Shape::filled(dot, color));
         }
     }
 
@@ -309,11 +299,9 @@ impl GraphPen<'_> {
     fn rows(&self, group: &mut Group, track: &ArrowPath, shown: &Shown, look: &ArrowLook) {
         let Some(place) = track.label else { return };
         let style = &self.style.edge;
-        let (size, halo) = (
-            style.size * self.fit.scale,
-            style.halo_width * self.fit.scale,
-        );
-        let rows = topics::rows(shown, &track.topics);
+        let scale = self.fit.scale;
+        let (size, halo) = (style.size * scale, style.halo_width * scale);
+        let rows = texts::rows(shown, &track.topics);
         let edge = place.middle(halo);
         let middle = rows.len() as f64 / 2.0 - 0.5;
         // If there are fewer rows than in other windows, they stay next to the line.
@@ -419,11 +407,7 @@ fn at_part(points: &[Point], length: f64, part: f64) -> Point {
     for pair in points.windows(2) {
         let step = pair[0].distance(pair[1]);
         if step >= left && step > 0.0 {
-            let t = left / step;
-            return Point::new(
-                pair[0].x + (pair[1].x - pair[0].x) * t,
-                pair[0].y + (pair[1].y - pair[0].y) * t,
-            );
+            return pair[0].towards(pair[1], left / step);
         }
         left -= step;
     }

@@ -5,8 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::arrows::ArrowPath;
-use super::page::GraphFit;
-use super::topics;
+use super::{GraphFit, texts};
 use crate::base::geometry::Size;
 use crate::base::ids::grouped;
 use crate::draw::style::Edge;
@@ -211,8 +210,8 @@ pub(crate) fn share(
         let look = |at: ArrowId, window: u32| view.arrows_shown[at].at(window as usize);
         for window in gate.turns(view) {
             let shown = gate.shown(view, |at| look(at, window));
-            let rows = shown.map(|(shown, _)| topics::rows(&shown, names));
-            let room = rows.and_then(|rows| topics::room(&rows, fonts, style));
+            let rows = shown.map(|(shown, _)| texts::rows(&shown, names));
+            let room = rows.and_then(|rows| texts::room(&rows, fonts, style));
             rooms[gate.lead] = larger(rooms[gate.lead], room);
         }
     }

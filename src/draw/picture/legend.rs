@@ -3,8 +3,7 @@
 use super::arrows::Tip;
 use super::badge::badge;
 use super::boxes::hexagon;
-use super::options;
-use super::page::PageFrame;
+use super::{PageFrame, options};
 use crate::base::geometry::{Point, Rect};
 use crate::base::words;
 use crate::draw::scene::{Anchor, Font, Form, Group, Shape, Stroke, Text, line};
@@ -61,17 +60,15 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
     let rate = format!("rate ± {} %", words::percent(rate_change));
     let is_starved = any(&|s| s.is_starved);
     let is_rated = !view.arrows.is_empty() && any(&|s| s.hz.is_some());
+    let unknown = "topic whose other end is unknown";
+    let starved = "gets nothing (quality of service)";
     let all = [
         (kind(ItemKind::Node), LegendSign::Node, "node"),
         (is_topic, LegendSign::Topic, "topic"),
         (is_service, LegendSign::Service, "service"),
         (kind(ItemKind::Group), LegendSign::Group, "group"),
         (namespace, LegendSign::Namespace, "namespace"),
-        (
-            has_rows,
-            LegendSign::Row,
-            "topic whose other end is unknown",
-        ),
+        (has_rows, LegendSign::Row, unknown),
         change(Mark::Added, added),
         change(Mark::Removed, removed),
         (is_rate, LegendSign::Change(Mark::Slower), &*rate),
@@ -85,11 +82,7 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
         state(State::Declared, "declared only"),
         confidence(Confidence::Stated, "stated"),
         confidence(Confidence::Inferred, "inferred"),
-        (
-            is_starved,
-            LegendSign::Starved,
-            "gets nothing (quality of service)",
-        ),
+        (is_starved, LegendSign::Starved, starved),
         (is_rated, LegendSign::Width, "thicker = higher rate"),
     ];
     let present = all.into_iter().filter(|(occurs, _, _)| *occurs);
@@ -140,10 +133,8 @@ pub(crate) fn legend(
     let place = page.legend;
     let unit = page.unit;
     group.shape(Shape::filled(Form::Rect(place, 0.0), style.legend.fill));
-    let edge = line(
-        Point::new(place.x, place.y),
-        Point::new(place.right(), place.y),
-    );
+    let right = Point::new(place.right(), place.y);
+    let edge = line(Point::new(place.x, place.y), right);
     group.shape(Shape::line(edge, Stroke::solid(style.legend.line, unit)));
     let size = style.legend.size * unit;
     let height = (place.h - 8.0 * unit) / rows.len().max(1) as f64;

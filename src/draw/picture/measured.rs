@@ -1,16 +1,15 @@
 //! The plan to lay out: every label at its widest, and every namespace with a box.
 
-use super::also::{self, Footer};
-use super::card::{self, Card};
-use super::gates::{self, Gate, larger};
-use super::spaces::{self, Space, first_seen, spaces};
-use super::texts::{
-    BADGE_HEIGHT, BADGE_PAD, LINE, Label, NO_MESSAGE, ShownRates, arrow_label, counting,
-    second_line, short_name, shown_rates,
-};
-use super::{options, topics};
 use std::collections::BTreeSet;
 
+use super::boxes::{self, Card};
+use super::gates::{self, Gate, larger};
+use super::options;
+use super::spaces::{self, Footer, Space, first_seen, spaces};
+use super::texts::{
+    self, BADGE_HEIGHT, BADGE_PAD, LINE, Label, NO_MESSAGE, ShownRates, arrow_label, counting,
+    second_line, short_name, shown_rates,
+};
 use crate::base::geometry::Size;
 use crate::base::name::namespace;
 use crate::base::words;
@@ -18,8 +17,9 @@ use crate::draw::style::{Body, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::graph::{ById, Id as _};
 use crate::layout::{self, Link, Outline, Plan, Vertex};
-use crate::view::both;
-use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Shown, ShownRuns, View};
+use crate::view::{
+    Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Shown, ShownRuns, View, both,
+};
 
 /// The largest width of a name in pixels, and in heights of its letters if these are large; longer ones are shortened in
 /// their middle. About 30 letters: of a wider box, a layer of the graph would be mostly space.
@@ -58,7 +58,7 @@ impl MeasuredGraph {
         let seconds = drafter.second_lines();
         let mut labels = Vec::new();
         let mut vertices = Vec::new();
-        let mut cards = card::cards(view, style, fonts);
+        let mut cards = boxes::cards(view, style, fonts);
         for (at, item) in view.items.iter().enumerate() {
             let inside = item
                 .cluster
@@ -85,9 +85,9 @@ impl MeasuredGraph {
         }
         let size = style.edge.size;
         let fitted = |arrow: &Arrow| -> Vec<String> {
-            let names = topics::names(view, arrow).into_iter();
+            let names = texts::names(view, arrow).into_iter();
             names
-                .map(|name| topics::fitted(&name, fonts, size))
+                .map(|name| texts::fitted(&name, fonts, size))
                 .collect()
         };
         let topics: Vec<Vec<String>> = view.arrows.iter().map(fitted).collect();
@@ -118,7 +118,7 @@ impl MeasuredGraph {
                 footer: Size::default(),
             });
         let mut clusters: Vec<layout::Cluster> = clusters.collect();
-        let footers = also::footers(view, style, fonts);
+        let footers = spaces::footers(view, style, fonts);
         for footer in &footers {
             match footer.cluster {
                 Some(at) => clusters[at].footer = footer.room,
@@ -298,7 +298,7 @@ impl Measurer<'_> {
                 }
                 let rooms = looks.distinct().iter();
                 let rooms =
-                    rooms.filter_map(|s| topics::room(&topics::rows(s, names), self.fonts, style));
+                    rooms.filter_map(|s| texts::room(&texts::rows(s, names), self.fonts, style));
                 return rooms.fold(None, |a, b| larger(a, Some(b)));
             }
             // A subscription shows its rate if its topic has another.

@@ -162,7 +162,7 @@ fn apart(p: Point, a: Point, b: Point) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::draw::picture::page::GraphFit;
+    use crate::draw::picture::GraphFit;
     use crate::draw::picture::texts::{Label, ShownRates};
     use crate::layout::Route;
 

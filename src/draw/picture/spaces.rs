@@ -1,12 +1,16 @@
 //! The frames of namespaces: their titles, the time of their first content, and the member lists of equal namespaces that are
-//! drawn as one: a badge for each.
+//! drawn as one: a badge for each; and the nodes and topics that are listed there as words.
 
-use super::page::GraphPen;
-use crate::base::geometry::{Point, Rect};
+use std::cmp::Reverse;
+use std::collections::BTreeSet;
+
+use super::texts::{self, LINE, counting, short_name};
+use super::{GraphPen, options};
+use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::{Anchor, Font, Form, Group, Shape, Stroke, Text};
-use crate::draw::style::Color;
+use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
-use crate::view::{MemberState, Namespace, View};
+use crate::view::{AlsoHere, Item, Mark, MemberState, Namespace, Shown, View};
 
 /// A namespace with a box around its members.
 #[derive(Clone, Debug, PartialEq)]
@@ -87,12 +91,8 @@ impl GraphPen<'_> {
         let size = self.style.cluster.size;
         let (place, scale) = (self.fit.rect(place).moved(by), self.fit.scale);
         let area = |(x, width): (f64, f64)| {
-            Rect::new(
-                place.x + (8.0 + x) * scale,
-                place.y + 3.0 * scale,
-                width * scale,
-                size * 1.15 * scale,
-            )
+            let (x, y) = (place.x + (8.0 + x) * scale, place.y + 3.0 * scale);
+            Rect::new(x, y, width * scale, size * 1.15 * scale)
         };
         let here = who.iter().filter(|who| who.is_here());
         let mut group = Group::new(format!("s{id}..members"), "members")
@@ -125,5 +125,213 @@ impl GraphPen<'_> {
         let letters = style.cluster.size * BADGE_TEXT * scale;
         let font = Font::new(letters, Weight::SemiBold, text);
         group.text(Text::centred(Anchor::Middle, area.centre(), font, index));
+    }
+}
+
+// The nodes and topics that are listed as words in their namespace: `also here: camera_tf, imu_driver, scan 4 Hz`.
+
+/// The width at which the words are wrapped unless their namespace is wider, in text heights: two names of usual length.
+const WIDTH: f64 = 22.0;
+/// The space above the words, in text heights: they must not look like names of the boxes above.
+const ABOVE: f64 = 0.4;
+/// The distance of the words from the frame of their namespace, in pixels: that of its title.
+const INSET: f64 = 8.0;
+const FIRST: &str = "also here:";
+/// The most names that are listed: ten lines or so. The others are counted.
+pub(crate) const MOST_LISTED: usize = 60;
+
+/// The words for the nodes of one namespace.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Footer {
+    /// The namespace: an index into the view's; `None` for the words outside of all.
+    pub(crate) cluster: Option<usize>,
+    /// The names as drawn.
+    names: Vec<String>,
+    /// The space that they need unless their namespace is wider.
+    pub(crate) room: Size,
+}
+
+/// The words of each namespace.
+pub(crate) fn footers(view: &View, style: &Style, fonts: &Fonts) -> Vec<Footer> {
+    let footer = |also: &AlsoHere| {
+        let space = also.cluster.and_then(|at| view.namespaces.get(at));
+        let inside = space.map_or("", |space| &*space.name);
+        let short = |item: &Item| {
+            let name = fonts.shown(short_name(&item.label, inside));
+            counting(&name, item.counted.len())
+        };
+        let names: Vec<String> = also.items.iter().map(short).collect();
+        let size = style.edge.size;
+        let all = names.iter().zip(&also.items).zip(&also.shown);
+        let long = |text: &String| text.chars().count();
+        let longest = all.map(|((name, item), shown)| {
+            let texts = shown.distinct().iter().map(|look| said(item, look, name));
+            texts.max_by_key(long).unwrap_or_else(|| name.clone())
+        });
+        let longest: Vec<String> = longest.collect();
+        let listed = listed(&longest, long);
+        let texts = listed.iter().map(|at| longest[*at].clone());
+        let words = words(texts, longest.len() - listed.len());
+        let places = broken(&words, fonts, size, WIDTH * size);
+        let ends = places.iter().zip(&words);
+        let ends = ends.map(|(at, word)| at.x + fonts.width(word, size, Weight::SemiBold));
+        let lines = places.last().map_or(0.0, |at| at.y) + 1.0;
+        Footer {
+            cluster: also.cluster,
+            room: Size::new(ends.fold(0.0, f64::max), size * (LINE * lines + ABOVE)),
+            names,
+        }
+    };
+    view.also.iter().map(footer).collect()
+}
+
+/// A name with its annotations: the rate of a topic, and the sign of a change.
+fn said(item: &Item, shown: &Shown, name: &str) -> String {
+    let is_rated = item.kind.word() != "node" && shown.mark != Some(Mark::Removed);
+    let rate = texts::rate_in(shown).filter(|_| is_rated);
+    let name = rate.map_or_else(|| name.to_owned(), |rate| format!("{name} {rate}"));
+    match shown.mark {
+        Some(Mark::Added) => format!("+ {name}"),
+        Some(Mark::Removed) => format!("− {name}"),
+        Some(Mark::Away) => format!("{name} (away)"),
+        _ => name,
+    }
+}
+
+/// The indices of the listed names, in order: those of the highest ranks if there are too many.
+fn listed<T, R: Ord>(all: &[T], rank: impl Fn(&T) -> R) -> Vec<usize> {
+    let mut places: Vec<usize> = (0..all.len()).collect();
+    if places.len() > MOST_LISTED {
+        places.sort_by_cached_key(|at| Reverse(rank(&all[*at])));
+        places.truncate(MOST_LISTED);
+        places.sort_unstable();
+    }
+    places
+}
+
+/// The names, each with its comma, after the introductory words; then the number of the others.
+fn words(names: impl Iterator<Item = String>, more: usize) -> Vec<String> {
+    let mut words = vec![FIRST.to_owned()];
+    words.extend(names.map(|name| name + ","));
+    if more > 0 {
+        words.push(format!("and {more} more"));
+    } else {
+        words.last_mut().map(String::pop);
+    }
+    words
+}
+
+/// The distance of each word from the left, and its line, in lines of at most this width unless a word is
+/// longer.
+fn broken(words: &[String], fonts: &Fonts, size: f64, most: f64) -> Vec<Point> {
+    let blank = fonts.width(" ", size, Weight::Regular);
+    let mut at = Point::default();
+    let place = |word: &String| {
+        let width = fonts.width(word, size, Weight::SemiBold);
+        if at.x > 0.0 && at.x + width > most {
+            at = Point::new(0.0, at.y + 1.0);
+        }
+        let here = at;
+        at.x += width + blank;
+        here
+    };
+    words.iter().map(place).collect()
+}
+
+/// Whether these words name something that changed.
+pub(crate) fn is_news(words: &Group) -> bool {
+    words.data.iter().any(|(key, _)| *key == "entries")
+}
+
+impl GraphPen<'_> {
+    /// The introductory words and the names of a footer for drawings of all windows, each with its rectangle.
+    pub(crate) fn footer_words(&self, footer: &Footer, place: Rect) -> Vec<(String, Rect)> {
+        let size = self.style.edge.size;
+        let inset = if footer.cluster.is_some() { INSET } else { 0.0 };
+        let words = words(footer.names.iter().cloned(), 0);
+        let most = (place.w - 2.0 * inset).max(footer.room.w) + 0.1;
+        let places = broken(&words, self.fonts, size, most);
+        let last = places.last().map_or(0.0, |at| at.y);
+        let bottom = place.bottom() - inset * 0.8;
+        let rect = |(word, at): (String, Point)| {
+            let width = self.fonts.width(&word, size, Weight::Regular);
+            let top = bottom - size * LINE * (last - at.y + 1.0);
+            let rect = Rect::new(place.x + inset + at.x, top, width, size * LINE);
+            (word, rect)
+        };
+        words.into_iter().zip(places).map(rect).collect()
+    }
+
+    /// The words in window `k` at the bottom of a rectangle: a namespace, or the area of the words outside of
+    /// all.
+    pub(crate) fn footer(
+        &self,
+        footer: &Footer,
+        also: &AlsoHere,
+        place: Rect,
+        view: &View,
+        k: usize,
+    ) -> Option<Group> {
+        let (style, scale) = (&self.style.edge, self.fit.scale);
+        let inset = if footer.cluster.is_some() { INSET } else { 0.0 };
+        let seen = also.items.iter().zip(&also.shown).zip(&footer.names);
+        let seen: Vec<_> = seen
+            .filter_map(|((item, shown), name)| Some((item, view.seen_at(shown, k)?, name)))
+            .collect();
+        let listed = listed(&seen, |(_, shown, _)| shown.mark.is_some());
+        let texts = listed.iter().map(|at| {
+            let (item, shown, short) = &seen[*at];
+            said(item, shown, short)
+        });
+        let words = words(texts, seen.len() - listed.len());
+        let most = (place.w - 2.0 * inset).max(footer.room.w) + 0.1;
+        let places = broken(&words, self.fonts, style.size, most);
+        let place = self.fit.rect(place);
+        let (size, step) = (style.size * scale, style.size * LINE * scale);
+        let last = places.last()?.y;
+        let names: Vec<&str> = seen.iter().map(|(item, ..)| &*item.name).collect();
+        let mut data = vec![("names", names.join(" "))];
+        let events = seen.iter().flat_map(|(_, shown, _)| &shown.events);
+        let events: BTreeSet<_> = events.collect();
+        if !events.is_empty() {
+            let places: Vec<String> = events.iter().map(ToString::to_string).collect();
+            data.push(("entries", places.join(" ")));
+        }
+        let number = footer.cluster.map_or_else(String::new, |at| at.to_string());
+        let mut group = Group::new(format!("also{number}"), "also")
+            .with(data)
+            .titled(names.join("\n"));
+        let marks = listed.iter().map(|at| seen[*at].1.mark);
+        let marks = std::iter::once(None).chain(marks).chain([None]);
+        for ((word, at), mark) in words.into_iter().zip(places).zip(marks) {
+            let bottom = place.bottom() - inset * 0.8 * scale;
+            let x = place.x + (inset + at.x) * scale;
+            let at = Point::new(x, bottom - step * (last - at.y + 0.15));
+            let changed = mark.map(|mark| options::change(self.style, mark).color);
+            let color = changed.unwrap_or(self.style.page.quiet);
+            let font = Font::new(size, Weight::of(mark.is_some()), color);
+            group.text(Text::new(Anchor::Start, at, font, word));
+        }
+        (!names.is_empty()).then_some(group)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_beyond_the_limit_are_counted_and_changed_ones_are_listed() {
+        let names: Vec<String> = (0..70).map(|n| format!("n{n}")).collect();
+        let few = words(names[..3].iter().cloned(), 0);
+        assert_eq!(few, ["also here:", "n0,", "n1,", "n2"]);
+
+        assert_eq!(listed(&names[..3], String::len), [0, 1, 2]);
+        let listed = listed(&names, |name| name == "n69");
+        let texts = listed.iter().map(|at| names[*at].clone());
+        let many = words(texts, names.len() - listed.len());
+        assert_eq!(many.len(), 1 + MOST_LISTED + 1);
+        assert_eq!(many[1], "n0,");
+        assert_eq!(many[MOST_LISTED..], ["n69,", "and 10 more"]);
     }
 }

@@ -1,7 +1,6 @@
 //! The bar on top: the changes of the window in words, with its time.
 
-use super::PageOptions;
-use super::page::PageFrame;
+use super::{PageFrame, PageOptions};
 use crate::base::geometry::Point;
 use crate::base::words;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Stroke, Text, line};
@@ -176,11 +175,8 @@ impl<'a> Title<'a> {
         let style = &self.style.title;
         let end = at.x + most;
         for (k, words) in line.iter().enumerate() {
-            let between = if k + 1 < line.len() {
-                BETWEEN_PHRASES
-            } else {
-                ""
-            };
+            let is_last = k + 1 == line.len();
+            let between = if is_last { "" } else { BETWEEN_PHRASES };
             let color = match words.sign {
                 Some('+') => style.added,
                 Some('−') => style.removed,
@@ -203,10 +199,8 @@ impl<'a> Title<'a> {
         let mut group = Group::named("clock");
         let (style, unit, view) = (&self.style.title, self.page.unit, self.view);
         let span = |k: Option<&Frame>| k.map_or(frame.span, |frame| frame.span);
-        let (start, end) = (
-            span(view.frames.first()).start,
-            span(view.frames.last()).end,
-        );
+        let start = span(view.frames.first()).start;
+        let end = span(view.frames.last()).end;
         let at = |stamp: crate::base::time::Stamp| words::moment_rounded(stamp.since(start));
         let mut parts = vec![self.name.clone()];
         let time = if view.compares {

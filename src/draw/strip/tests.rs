@@ -195,3 +195,54 @@ fn piece_bounds(piece: &Piece) -> Option<Rect> {
         )),
     }
 }
+
+/// A view of windows 10, 11, … in which this many nodes appear.
+fn view(added: &[usize]) -> View {
+    let frame = |(place, nodes_added): (usize, &usize)| Frame {
+        headlines: vec![started(); *nodes_added],
+        counts: Counts {
+            nodes_added: *nodes_added,
+            ..Counts::default()
+        },
+        ..Frame::empty(10 + place, Span::new(Stamp(0), Stamp(1)))
+    };
+    View {
+        frames: added.iter().enumerate().map(frame).collect(),
+        ..View::default()
+    }
+}
+
+fn places(choice: &str, added: &[usize]) -> Vec<usize> {
+    Choice::parse(choice).unwrap().places(&view(added)).unwrap()
+}
+
+#[test]
+fn choices_are_parsed_in_all_forms() {
+    assert_eq!(Choice::parse("3x2").unwrap(), Choice::Grid(3, 2));
+    assert_eq!(
+        Choice::parse("0, 4,9").unwrap(),
+        Choice::Windows(vec![0, 4, 9])
+    );
+    for bad in ["", "0x2", "3x", "x", "1000x1", "all", "-1", "1,,2"] {
+        assert!(Choice::parse(bad).is_err_and(|e| e.is_usage()), "{bad}");
+    }
+}
+
+#[test]
+fn a_grid_takes_the_first_and_those_that_change_most() {
+    assert_eq!(places("2x2", &[0, 1, 5, 0, 2, 3]), [0, 2, 4, 5]);
+    assert_eq!(places("3x1", &[0, 0]), [0, 1]);
+}
+
+#[test]
+fn changes_are_all_windows_with_a_change_up_to_a_limit() {
+    assert_eq!(places("changes", &[0, 1, 0, 2]), [0, 1, 3]);
+    assert_eq!(places("changes", &[1; 40]).len(), MOST);
+}
+
+#[test]
+fn windows_are_selected_by_index() {
+    assert_eq!(places("12,10", &[0, 0, 0]), [2, 0]);
+    let missing = Choice::Windows(vec![9]).places(&view(&[0]));
+    assert!(missing.is_err_and(|e| e.is_usage()));
+}

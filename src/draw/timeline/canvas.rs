@@ -309,15 +309,13 @@ impl<'a> PaperCanvas<'a> {
     /// The groups in the colours of a style, for a page on a screen.
     pub(crate) fn into_styled(self, style: &Style) -> Vec<Group> {
         let band = style.timeline.future.towards(style.legend.fill, 0.5);
+        let bar = style.timeline.past.towards(style.timeline.text, 0.4);
         let table = [
             (ink::PAPER, style.page.background),
             (ink::TEXT, style.page.text),
             (ink::QUIET, style.timeline.text),
             // Darker than a bar of messages that are past, to be distinguished from pale ones.
-            (
-                ink::BAR,
-                style.timeline.past.towards(style.timeline.text, 0.4),
-            ),
+            (ink::BAR, bar),
             (ink::FOLDED, style.timeline.future),
             (ink::LINE, style.timeline.axis),
             (ink::RULE, style.timeline.axis),

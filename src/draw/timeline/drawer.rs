@@ -4,12 +4,11 @@
 use super::Timeline;
 use super::canvas::{HAIRLINE, PaperCanvas, Sizes, Type, ink};
 use super::marks::{RowMark, Sign};
-use super::phases::PhaseLabel;
+use super::notes::PhaseLabel;
 use super::rows::{Level, Row, SendingBar};
-use crate::base::cast;
 use crate::base::geometry::{Point, Rect};
 use crate::base::time::{Span, Stamp, round_length};
-use crate::base::words;
+use crate::base::{cast, words};
 use crate::draw::scene::{Form, Group, Shape, Stroke};
 use crate::draw::style::{Color, Style};
 use crate::mission::event_log::Interruption;
@@ -312,11 +311,8 @@ impl Drawer {
             }
             if k > 0 {
                 let dashed = Stroke::dashed(ink::RULE, HAIRLINE, &[0.7, 0.6]);
-                canvas.line(
-                    Point::new(column.x, top),
-                    Point::new(column.x, bottom),
-                    &dashed,
-                );
+                let [from, to] = [top, bottom].map(|y| Point::new(column.x, y));
+                canvas.line(from, to, &dashed);
             }
         }
         let interruptions = self.timeline.interruptions.iter();
@@ -471,11 +467,8 @@ impl Drawer {
         let at = |row: usize, mark: &RowMark| Point::new(self.axis.x(mark.at), self.y(row));
         for &(row, mark) in [Sign::Start, Sign::End, Sign::Dot].into_iter().flat_map(of) {
             self.begin_mark(canvas, mark);
-            let size = if self.density == Density::Frame {
-                1.3
-            } else {
-                1.0
-            };
+            let is_small = self.density == Density::Frame;
+            let size = if is_small { 1.3 } else { 1.0 };
             put(canvas, mark.sign, at(row, mark), size);
         }
         // The places that the next arrows and letters avoid.
@@ -549,11 +542,8 @@ fn arrow(canvas: &mut PaperCanvas<'_>, from: f64, to: Point, taken: &mut Vec<Rec
     }
     let (x, side) = (place.x, if to.y > from { -1.0 } else { 1.0 });
     let start = Point::new(x, from);
-    canvas.line(
-        start,
-        Point::new(x, to.y + side),
-        &Stroke::solid(ink::CHANGED, 0.3),
-    );
+    let stroke = Stroke::solid(ink::CHANGED, 0.3);
+    canvas.line(start, Point::new(x, to.y + side), &stroke);
     canvas.disc(start, 0.55, ink::CHANGED, &Stroke::default());
     canvas.head(start, Point::new(x, to.y + side * 0.15), 1.3, ink::CHANGED);
     taken.push(place);
@@ -571,11 +561,8 @@ pub(crate) fn put(canvas: &mut PaperCanvas<'_>, sign: Sign, at: Point, size: f64
         Sign::End => {
             let stroke = Stroke::solid(ink::REMOVED, 0.38);
             for down in [-1.35 * r, 1.35 * r] {
-                canvas.line(
-                    Point::new(x - r, y - down),
-                    Point::new(x + r, y + down),
-                    &stroke,
-                );
+                let (from, to) = (Point::new(x - r, y - down), Point::new(x + r, y + down));
+                canvas.line(from, to, &stroke);
             }
         }
         _ => canvas.disc(at, r, ink::PAPER, &Stroke::solid(ink::CHANGED, 0.25)),

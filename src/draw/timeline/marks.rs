@@ -3,15 +3,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::FigureSource;
 use super::rows::{Row, relative};
-use super::source::FigureSource;
 use crate::base::name::last_part;
 use crate::base::time::Stamp;
 use crate::base::words::{self, worded};
 use crate::graph::{Element, NodeId};
 use crate::mission::EventId;
-use crate::mission::event_log::{Detail, Event, Kind, Parts};
-use crate::mission::event_log::{predicate, sentence};
+use crate::mission::event_log::{Detail, Event, Kind, Parts, predicate, sentence};
 
 /// The most letters, and the most arrows: more crowd the rows. Other events are marked by a small circle.
 const MOST: (usize, usize) = (10, 6);

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
-use super::subplan::Subplan;
+use super::parts::Subplan;
 use super::{Draft, PlacedPart};
 use crate::base::geometry::{Point, Rect, Size, polyline};
 use crate::layout::routes::around::{End, Map, meets};
@@ -71,11 +71,8 @@ impl<'a> Blocks<'a> {
         let laid_out = |space: usize, shape: f64| {
             let page = Size::new(options.page.h * shape, options.page.h);
             // On a page of its own it may be as small as it likes, unless it is a sketch.
-            let least = if options.least.is_finite() {
-                0.0
-            } else {
-                options.least
-            };
+            let is_sketch = options.least.is_infinite();
+            let least = if is_sketch { options.least } else { 0.0 };
             let options = LayoutOptions {
                 page,
                 least,
@@ -85,14 +82,13 @@ impl<'a> Blocks<'a> {
             let (_, layout) = Draft::new(&sub.plan, &options)?.assembled(task.orientation);
             Some(Contents { sub, layout })
         };
-        let spaces = cut.spaces.par_iter();
-        let contents = spaces.map(|space| {
+        let each = |space: &usize| {
             SHAPES
                 .iter()
                 .map(|shape| laid_out(*space, *shape))
                 .collect()
-        });
-        let contents: Option<Vec<Vec<Contents>>> = contents.collect();
+        };
+        let contents: Option<Vec<Vec<Contents>>> = cut.spaces.par_iter().map(each).collect();
         Some(Self {
             contents: contents?,
             task,
@@ -140,9 +136,8 @@ impl<'a> Blocks<'a> {
         let lines: Vec<Line> = placed.routes.iter().map(Line::new).collect();
         placed.crossings = turns + crossings(&lines);
         for (at, link) in part.links.iter().enumerate() {
-            let size = plan.links[*link]
-                .label
-                .map(|size| turned(size, self.task.orientation));
+            let size = plan.links[*link].label;
+            let size = size.map(|size| turned(size, self.task.orientation));
             let label = placed.routes[at].label.zip(size);
             let label = label.map(|(middle, size)| Rect::around(middle, size));
             let is_crossed = |label: Rect| {
@@ -162,17 +157,12 @@ impl<'a> Blocks<'a> {
         let task = &self.task;
         let clusters = task.part.clusters.iter().zip(&placed.clusters);
         let words = clusters.map(|(&at, frame)| {
-            let size = task.plan.clusters[at].footer;
-            match task.orientation {
-                Orientation::LeftRight => {
-                    let corner = (frame.x + PADDING, frame.bottom() - size.h);
-                    Rect::new(corner.0, corner.1, size.w, size.h)
-                }
-                Orientation::TopBottom => {
-                    let corner = (frame.right() - size.h, frame.y + PADDING);
-                    Rect::new(corner.0, corner.1, size.h, size.w)
-                }
-            }
+            let size = turned(task.plan.clusters[at].footer, task.orientation);
+            let (x, y) = match task.orientation {
+                Orientation::LeftRight => (frame.x + PADDING, frame.bottom() - size.h),
+                Orientation::TopBottom => (frame.right() - size.w, frame.y + PADDING),
+            };
+            Rect::new(x, y, size.w, size.h)
         });
         words
             .filter(|words| words.w > 0.0 && words.h > 0.0)
@@ -353,10 +343,8 @@ fn crossings(lines: &[Line]) -> u64 {
     for (at, line) in lines.iter().enumerate() {
         for other in &lines[at + 1..] {
             for piece in line.near(&other.bounds) {
-                crossings += other
-                    .near(&line.bounds)
-                    .filter(|o| crosses(piece, *o))
-                    .count() as u64;
+                let near = other.near(&line.bounds);
+                crossings += near.filter(|other| crosses(piece, *other)).count() as u64;
             }
         }
     }

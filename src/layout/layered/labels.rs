@@ -34,27 +34,16 @@ pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
         return;
     }
     let mut order: Vec<usize> = (0..lines.len()).collect();
-    order.sort_by(|&a, &b| {
-        lines[a]
-            .length()
-            .total_cmp(&lines[b].length())
-            .then(a.cmp(&b))
-    });
+    let length = |i: usize| lines[i].length();
+    order.sort_by(|&a, &b| length(a).total_cmp(&length(b)).then(a.cmp(&b)));
     let area = layout.size.w * layout.size.h / layout.boxes.len().max(1) as f64;
     let mut taken = Obstacles::new(area.sqrt().max(40.0));
     for rect in &layout.boxes {
         taken.insert(rect.grown(1.0), 0);
     }
     for (frame, cluster) in layout.clusters.iter().zip(&plan.clusters) {
-        taken.insert(
-            Rect::new(
-                frame.x + 4.0,
-                frame.y + 2.0,
-                cluster.title.w + 4.0,
-                cluster.title.h,
-            ),
-            0,
-        );
+        let Size { w, h } = cluster.title;
+        taken.insert(Rect::new(frame.x + 4.0, frame.y + 2.0, w + 4.0, h), 0);
     }
     for label in layout.labels(plan) {
         taken.insert(label.grown(0.5), 0);
@@ -72,10 +61,8 @@ pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
         if taken.looks.get() + edges.looks.get() > EFFORT {
             break;
         }
-        let Some(size) = plan.links[i]
-            .label
-            .filter(|_| layout.routes[i].label.is_none())
-        else {
+        let label = plan.links[i].label;
+        let Some(size) = label.filter(|_| layout.routes[i].label.is_none()) else {
             continue;
         };
         layout.routes[i].label = lines[i].spot(size, i, &taken, &edges);
@@ -88,9 +75,8 @@ pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
 /// Moves and enlarges the layout if a label is outside of it.
 pub(crate) fn make_room(plan: &Plan, layout: &mut Layout) {
     let before = Rect::new(0.0, 0.0, layout.size.w, layout.size.h);
-    let whole = layout
-        .labels(plan)
-        .fold(before, |all, label| all.union(&label));
+    let labels = layout.labels(plan);
+    let whole = labels.fold(before, |all, label| all.union(&label));
     if whole != before {
         layout.cropped(whole);
     }
@@ -112,15 +98,10 @@ impl Segments {
                 let apart = |p: &Point| (along(p) - along(&from)).abs();
                 [a, b, to].iter().all(|p| apart(p) < 0.1)
             };
-            let steps = if is_level(|p| p.x) || is_level(|p| p.y) {
-                1
-            } else {
-                8
-            };
-            points.extend(
-                (1..=steps)
-                    .map(|step| on_cubic([from, a, b, to], f64::from(step) / f64::from(steps))),
-            );
+            let is_straight = is_level(|p| p.x) || is_level(|p| p.y);
+            let steps = if is_straight { 1 } else { 8 };
+            let parts = (1..=steps).map(|step| f64::from(step) / f64::from(steps));
+            points.extend(parts.map(|t| on_cubic([from, a, b, to], t)));
         }
         let mut at = vec![0.0];
         for piece in points.windows(2) {
@@ -137,10 +118,8 @@ impl Segments {
     /// The point at a fraction of the length, and whether the line is closer to horizontal there.
     fn station(&self, part: f64) -> Option<(Point, bool)> {
         let goal = self.length() * part;
-        let i = self
-            .at
-            .windows(2)
-            .position(|pair| pair[0] <= goal && goal <= pair[1] && pair[0] < pair[1])?;
+        let is_here = |at: &[f64]| at[0] <= goal && goal <= at[1] && at[0] < at[1];
+        let i = self.at.windows(2).position(is_here)?;
         let (a, b) = (self.points[i], self.points[i + 1]);
         let t = (goal - self.at[i]) / (self.at[i + 1] - self.at[i]);
         Some((a.towards(b, t), (b.x - a.x).abs() > (b.y - a.y).abs()))
@@ -167,13 +146,8 @@ impl Segments {
                     continue;
                 }
                 // One beside its own edge should not hide parts of it.
-                let is_beside = spot != point;
-                let cost = cost
-                    + if is_beside && !hits.is_empty() {
-                        TOUCHING
-                    } else {
-                        0.0
-                    };
+                let is_touching = spot != point && !hits.is_empty();
+                let cost = cost + if is_touching { TOUCHING } else { 0.0 };
                 if best.is_none_or(|(least, _)| cost < least) {
                     best = Some((cost, spot));
                 }
@@ -189,11 +163,8 @@ impl Segments {
         } else {
             (size.h, Point::new(size.w / 2.0 + ASIDE, 0.0))
         };
-        let on = if self.length() > 2.5 * hidden {
-            0.3
-        } else {
-            HIDING
-        };
+        let is_long = self.length() > 2.5 * hidden;
+        let on = if is_long { 0.3 } else { HIDING };
         [
             (on, point),
             (0.4, Point::new(point.x - away.x, point.y - away.y)),
@@ -226,13 +197,10 @@ impl Obstacles {
 
     /// The rectangles around a straight line, in parts if it is long.
     fn insert_line(&mut self, a: Point, b: Point, number: usize) {
-        let parts = libm::ceil((b.x - a.x).abs().max((b.y - a.y).abs()) / (LONG * self.cell));
-        for k in 0..cast::to_u32(parts.max(1.0)) {
-            let (from, to) = (
-                f64::from(k) / parts.max(1.0),
-                f64::from(k + 1) / parts.max(1.0),
-            );
-            let ends = [a.towards(b, from), a.towards(b, to)];
+        let long = (b.x - a.x).abs().max((b.y - a.y).abs());
+        let parts = libm::ceil(long / (LONG * self.cell)).max(1.0);
+        for k in 0..cast::to_u32(parts) {
+            let ends = [k, k + 1].map(|end| a.towards(b, f64::from(end) / parts));
             self.insert(Rect::of_points(ends).unwrap_or_default(), number);
         }
     }

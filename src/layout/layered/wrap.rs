@@ -2,7 +2,7 @@
 //!
 //! Each row is a separate layout; the edges between rows run through the channels between them.
 
-use super::subplan::Subplan;
+use super::parts::Subplan;
 use super::{Draft, PlacedPart};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::layout::routes::around::{End, Map};
@@ -79,10 +79,8 @@ fn cuts(part: &Component, layers: &Layers, many: usize) -> Option<Vec<usize>> {
         }
     }
     let is_whole = |rank: usize| {
-        let spans = layers.span.iter().skip(1);
-        spans
-            .into_iter()
-            .all(|&(low, high)| rank <= low || rank > high)
+        let mut spans = layers.span.iter().skip(1);
+        spans.all(|&(low, high)| rank <= low || rank > high)
     };
     let length = layers.ranks / many;
     let cut = |k: usize| {
@@ -178,11 +176,8 @@ impl Wrapped {
     /// another.
     fn channels(&self, (from, to): (usize, usize)) -> Vec<usize> {
         let (a, b) = (self.row[from], self.row[to]);
-        let mut ways = if a < b {
-            vec![a, b - 1]
-        } else {
-            vec![a - 1, b]
-        };
+        let ways = if a < b { [a, b - 1] } else { [a - 1, b] };
+        let mut ways = ways.to_vec();
         ways.dedup();
         ways
     }

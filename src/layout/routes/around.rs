@@ -4,7 +4,7 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-use crate::base::geometry::{Point, Rect, Size};
+use crate::base::geometry::{Point, Rect};
 use crate::layout::routes::PORTS;
 use crate::layout::{Outline, Plan, Route};
 
@@ -28,16 +28,9 @@ pub(crate) fn routes(plan: &Plan, boxes: &[Rect]) -> (Vec<Route>, usize) {
         let (from, to) = (plan.links[i].from, plan.links[i].to);
         let count = met.entry((from.min(to), from.max(to))).or_insert(0);
         *count += 1;
-        let ends = (
-            VertexPlace {
-                plan,
-                boxes,
-                v: from,
-            },
-            VertexPlace { plan, boxes, v: to },
-        );
+        let ends = [from, to].map(|v| VertexPlace { plan, boxes, v });
         if from == to {
-            routes[i] = ends.0.self_loop(*count);
+            routes[i] = ends[0].self_loop(*count);
             continue;
         }
         let (a, b) = shifted(&ends, *count);
@@ -180,33 +173,24 @@ fn leaves(rect: &Rect, outline: Outline, inside: Point, outside: Point) -> Point
 }
 
 /// The ends of the `count`-th edge between two boxes, inside both, beside those of the edges before.
-fn shifted((from, to): &(VertexPlace, VertexPlace), count: usize) -> (Point, Point) {
+fn shifted([from, to]: &[VertexPlace; 2], count: usize) -> (Point, Point) {
     let (start, end) = (from.rect().centre(), to.rect().centre());
-    let step = (count / 2) as f64
-        * if count.is_multiple_of(2) {
-            PARALLEL
-        } else {
-            -PARALLEL
-        };
+    let is_even = count.is_multiple_of(2);
+    let step = (count / 2) as f64 * if is_even { PARALLEL } else { -PARALLEL };
     // Edges in both directions use the same side.
     let step = if from.v < to.v { step } else { -step };
     let length = start.distance(end).max(1e-9);
-    let aside = Point::new(
-        (start.y - end.y) / length * step,
-        (end.x - start.x) / length * step,
-    );
+    let (x, y) = ((start.y - end.y) / length, (end.x - start.x) / length);
     let inside = |rect: Rect| {
-        let (most, centre) = (Size::new(rect.w / 4.0, rect.h / 4.0), rect.centre());
-        Point::new(
-            centre.x + aside.x.clamp(-most.w, most.w),
-            centre.y + aside.y.clamp(-most.h, most.h),
-        )
+        let (wide, high, centre) = (rect.w / 4.0, rect.h / 4.0, rect.centre());
+        let (x, y) = ((x * step).clamp(-wide, wide), (y * step).clamp(-high, high));
+        Point::new(centre.x + x, centre.y + y)
     };
     (inside(from.rect()), inside(to.rect()))
 }
 
 /// The route along a path, cut at the outlines, as straight pieces.
-fn drawn((a, b): &(VertexPlace, VertexPlace), way: &[Point]) -> Route {
+fn drawn([a, b]: &[VertexPlace; 2], way: &[Point]) -> Route {
     let last = way.len() - 1;
     let start = a.leaves(way[0], way[1]);
     let mut points = vec![start];
@@ -221,6 +205,7 @@ fn drawn((a, b): &(VertexPlace, VertexPlace), way: &[Point]) -> Route {
 }
 
 /// The obstacles in the way of edges, and the points where an edge can turn.
+#[derive(Default)]
 pub(crate) struct Map {
     obstacles: Vec<Rect>,
     corners: Vec<Point>,
@@ -232,11 +217,7 @@ impl Map {
         // If checking every corner against every box exceeds the effort, no route would be found: all edges
         // are straight.
         if boxes.len().saturating_mul(boxes.len()) > EFFORT {
-            return Self {
-                obstacles: Vec::new(),
-                corners: Vec::new(),
-                effort: 0,
-            };
+            return Self::default();
         }
         let obstacles: Vec<Rect> = boxes.iter().map(|rect| rect.grown(CLEAR)).collect();
         let mut corners = Vec::new();
@@ -289,10 +270,8 @@ impl Map {
         let mut lanes = sides.map(|y| Point::new(foot.x, y));
         lanes.sort_by(|a, b| (a.y - from.y).abs().total_cmp(&(b.y - from.y).abs()));
         // A route between rows of blocks may start above or below its block.
-        let is_level = route
-            .curves
-            .first()
-            .is_some_and(|first| (first[0].y - from.y).abs() < SAME);
+        let first = route.curves.first();
+        let is_level = first.is_some_and(|first| (first[0].y - from.y).abs() < SAME);
         if is_level && self.clear(level, Point::new(from.x, level.y), own) {
             let start = leaves(&end.rect, end.outline, level, Point::new(from.x, level.y));
             return Some((route.raised(level.y).along(&[start]), true));
@@ -367,11 +346,8 @@ impl Map {
         }
         self.effort -= self.obstacles.len();
         let foreign = |v: usize| v != own.0 && v != own.1;
-        !self
-            .obstacles
-            .iter()
-            .enumerate()
-            .any(|(v, rect)| foreign(v) && meets(a, b, rect))
+        let mut boxes = self.obstacles.iter().enumerate();
+        !boxes.any(|(v, rect)| foreign(v) && meets(a, b, rect))
     }
 }
 
@@ -409,6 +385,7 @@ pub(crate) fn meets(a: Point, b: Point, rect: &Rect) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::geometry::Size;
     use crate::base::geometry::polyline;
     use crate::layout::tests::{link, vertex};
 

@@ -14,9 +14,7 @@ use crate::base::table::{
 use crate::base::time::Stamp;
 use crate::base::words;
 use crate::evidence::message::fields::{Decoder, Decoders, KnownTypes};
-use crate::export::tables::TableFormat;
-use crate::export::tables::folder::{Folder, Part, file_stem};
-use crate::export::tables::writer::begin;
+use crate::export::tables::{Folder, Part, TableFormat, begin, file_stem};
 use crate::pipeline::Watch;
 use crate::pipeline::collect::no_messages;
 use crate::pipeline::times::of_report;

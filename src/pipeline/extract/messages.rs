@@ -7,7 +7,7 @@ use crate::base::name::TopicName;
 use crate::base::table::{Batch, ColumnKind, TableCell, TableColumn};
 use crate::evidence::times::Timed;
 use crate::export::sink::OutputSink;
-use crate::export::tables::writer::begin;
+use crate::export::tables::begin;
 use crate::pipeline::Watch;
 use crate::pipeline::collect::no_messages;
 use crate::pipeline::times::{MessageTimes, Sender};

@@ -76,17 +76,9 @@ impl View {
         for row in &mut rows {
             row.owner = places[row.owner];
         }
-        rows.sort_by(|a, b| {
-            let key = |row: &BoxRow| {
-                (
-                    row.owner,
-                    [!row.ways[0], !row.ways[1]],
-                    row.is_infrastructure,
-                )
-            };
-            key(a)
-                .cmp(&key(b))
-                .then_with(|| a.item.name.cmp(&b.item.name))
+        rows.sort_by_cached_key(|row| {
+            let (ways, name) = (row.ways.map(|is| !is), Arc::clone(&row.item.name));
+            (row.owner, ways, row.is_infrastructure, name)
         });
         self.rows = rows;
     }

@@ -237,3 +237,34 @@ fn absurd_sizes_are_refused() {
         );
     }
 }
+
+#[test]
+fn a_long_curve_touches_few_tiles() {
+    let page = Size::new(1280.0, 720.0);
+    let steps = vec![
+        Step::Move(Point::new(10.0, 10.0)),
+        Step::Curve([
+            Point::new(600.0, 10.0),
+            Point::new(600.0, 700.0),
+            Point::new(1270.0, 700.0),
+        ]),
+    ];
+    let shape = Shape::line(Form::Path(steps), Stroke::solid(Color::NONE, 1.0));
+    let mut tiles = Tiles::none(page);
+    tiles.add_shape(&shape);
+    assert!(
+        tiles.share() > 0.03 && tiles.share() < 0.25,
+        "{}",
+        tiles.share()
+    );
+    assert_eq!(tiles.iter().next(), Some((0, 0)));
+}
+
+#[test]
+fn elements_outside_the_page_take_few_tiles() {
+    let mut tiles = Tiles::none(Size::new(100.0, 100.0));
+    tiles.add(Rect::new(-500.0, -500.0, 10.0, 10.0));
+    tiles.add(Rect::new(5000.0, 20.0, 10.0, 10.0));
+    tiles.add(Rect::new(f64::NAN, 0.0, 1.0, 1.0));
+    assert!(tiles.iter().count() <= 4);
+}
