@@ -23,7 +23,7 @@ use crate::draw::topic_timeline::TopicTimeline;
 use crate::export::options::{self, Choice, FigureOptions};
 use crate::export::run;
 use crate::export::sequence::{Drawings, Sequence, Unfolded};
-use crate::export::{self, OneDrawing, Output, Written};
+use crate::export::{self, OneDrawing, Output, Written, mermaid};
 use crate::graph::window::default_period;
 use crate::layout::LayoutOptions;
 use crate::mission::Mission;
@@ -327,13 +327,14 @@ impl<'a> Showing<'a> {
             // Two such panels side by side fit a screen.
             self.drawing = self.drawing.clone().seen(Purpose::Readme);
         }
-        let composed = if is_drawn {
+        let mut composed = if is_drawn {
             fitted(mission, &self.drawing, watch)
         } else if self.outputs.iter().any(|o| o.format.is_viewed) {
             self.unplaced(&self.drawing)
         } else {
             Composed::default()
         };
+        let paired = self.paired(&mut composed);
         let (view, elements) = (&composed.view, &mission.elements);
         if is_drawn && view.items.is_empty() && elements.nodes.len() + elements.topics.len() > 0 {
             return Err(nothing(elements));
@@ -354,7 +355,6 @@ impl<'a> Showing<'a> {
         remarks.for_each(|text| self.remark(text));
         self.notices.extend(composed.notices.iter());
         let places = is_drawn.then(|| composed.places());
-        let paired = self.paired();
         let sequence = Sequence {
             places: places.as_ref(),
             picture: picture.as_ref().map_or(&(), |p| p as &dyn Drawings),
@@ -381,12 +381,19 @@ impl<'a> Showing<'a> {
     }
 
     /// The view with one line per pair of nodes, if an output is or contains a chart in which topics were not asked for.
-    fn paired(&self) -> Option<Composed> {
+    /// Of a large chart alone, it replaces the view of each topic, so that only one of the two is in memory.
+    fn paired(&self, composed: &mut Composed) -> Option<Composed> {
         let mut drawing = self.drawing.clone();
         let is_chart = |output: &Output| matches!(output.format.word, "mmd" | "md");
         let is_free = !drawing.view.keeps_topics && self.outputs.iter().any(is_chart);
         (drawing.view.mode, drawing.view.is_bundled) = (Mode::Nodes, true);
         drawing.view.is_picture = false;
+        let is_alone = self.outputs.iter().all(|o| o.format.word == "mmd");
+        if is_free && is_alone && composed.view.arrows.len() > mermaid::MANY {
+            *composed = Composed::default();
+            *composed = self.unplaced(&drawing);
+            return None;
+        }
         is_free.then(|| self.unplaced(&drawing))
     }
 
