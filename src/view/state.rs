@@ -171,9 +171,9 @@ impl<'a> Now<'a> {
             one.is_paused = true;
             one.state = one.state.max(State::Silent);
         }
-        let starves = |span: &Span| span.start < self.span.end && self.span.start < span.end;
+        let is_now = |span: &Span| span.start < self.span.end && self.span.start < span.end;
         let starved = self.starved.get(&what);
-        one.is_starved = starved.is_some_and(|spans| spans.iter().any(starves));
+        one.is_starved = starved.is_some_and(|spans| spans.iter().any(is_now));
         if let Some(topic) = self.waits_for(what) {
             one.is_paused = true;
             one.state = self.state_of_waiting(topic).max(one.state);

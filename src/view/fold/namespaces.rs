@@ -52,7 +52,7 @@ impl<'a> Collapse<'a> {
                 folded.entry(space).or_default()[at] += 1;
             }
         }
-        let open: BTreeMap<&str, ()> = self.expand.iter().map(|name| (*name, ())).collect();
+        let open: BTreeMap<&str, &str> = self.expand.iter().map(|name| (*name, *name)).collect();
         let is_rest = |space| inside(&open, space).next().is_some();
         let single = folded
             .into_iter()
