@@ -19,16 +19,17 @@ mod shown;
 mod state;
 mod still;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::base::ids::ids;
+use crate::base::ids::{grouped, ids};
 use crate::base::notice::Notices;
 use crate::graph::{ById, Element};
 use crate::mission::Mission;
 pub(crate) use filtered::filtered;
 pub use fold::box_rows::BoxRow;
 pub use fold::namespaces::Collapsible;
-pub(crate) use fold::namespaces::{COMMON, headlines};
+pub(crate) use fold::namespaces::{COMMON, headlines, inside};
 pub(crate) use frames::{BETWEEN_PHRASES, Words, joined};
 pub use frames::{Frame, Headline, Phrase};
 pub(crate) use listed::{DrawnPart, drawn_part};
@@ -88,7 +89,7 @@ fn assembled(viewed: items::Viewed<'_>, options: &ViewOptions, frames: frames::F
     view.namespaces = fold::namespaces::clusters(&mut view.items, depth, &names);
     let mut equal = Vec::new();
     for namespace in &mut view.namespaces {
-        if let Some(at) = fleets.iter().position(|f| f.name == namespace.name) {
+        if let Some(at) = viewed.fleets.named(&namespace.name) {
             namespace.replicas = fleets[at].indices();
             equal.push(at);
         }
@@ -347,6 +348,13 @@ pub struct View {
     pub compares: bool,
 }
 
+/// The namespaces, by index, and the items that a window shows directly in each namespace, and outside of all. Namespaces
+/// nest at most 16 deep.
+pub(crate) struct Contents<'a> {
+    pub(crate) spaces: BTreeMap<Option<usize>, Vec<usize>>,
+    pub(crate) items: BTreeMap<Option<usize>, Vec<(&'a Shown, &'a Item)>>,
+}
+
 impl View {
     /// The namespaces with a box around an item, the innermost first.
     pub(crate) fn around(&self, item: ItemId) -> impl Iterator<Item = usize> + '_ {
@@ -363,6 +371,21 @@ impl View {
             inhabited[at] = true;
         }
         inhabited
+    }
+
+    /// What is in each namespace in a window.
+    pub(crate) fn contents<'a>(&'a self, seen: &'a SeenWindow) -> Contents<'a> {
+        let inhabited = self.inhabited(seen);
+        let spaces = self.namespaces.iter().enumerate();
+        let spaces = spaces.filter(|(at, _)| inhabited[*at]);
+        let items = seen.items.iter().filter_map(|shown| {
+            let item = self.items.get(shown.item())?;
+            Some((item.cluster, (shown, item)))
+        });
+        Contents {
+            spaces: grouped(spaces.map(|(at, space)| (space.parent, at))),
+            items: grouped(items),
+        }
     }
 
     /// Whether there is a time axis to show: not for two compared missions, and not for one window.

@@ -13,6 +13,6 @@ pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<
     let drawing = DotView::new(sequence.mission, view, style, &Fonts::bundled());
     let target = target.clone();
     Ok(at_end(move || {
-        text_per_window(view, &target, |seen| drawing.write(seen))
+        text_per_window(view, &target, |sink, seen| drawing.write(sink, seen))
     }))
 }

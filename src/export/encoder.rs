@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::palette::{Area, Palette};
 use super::sequence::{FrameTime, Sequence};
-use super::sink::{OutputSink, write_file};
+use super::sink::OutputSink;
 use super::target::Target;
 use crate::base::error::Result;
 use crate::draw::paint::raster::Pixels;
@@ -178,11 +178,13 @@ pub(crate) fn one_text<'a>(
 pub(crate) fn text_per_window(
     view: &View,
     target: &Target,
-    text: impl Fn(&SeenWindow) -> String,
+    text: impl Fn(&mut OutputSink, &SeenWindow) -> io::Result<()>,
 ) -> Result<Written> {
     let mut written = Written::to(target);
     let mut write = |target: &Target, seen: &SeenWindow| -> Result<()> {
-        written.add(write_file(target, text(seen).as_bytes())?);
+        let mut sink = OutputSink::create(target, None)?;
+        text(&mut sink, seen).map_err(sink.error())?;
+        written.add(sink.commit()?);
         Ok(())
     };
     let frames = &view.frames;

@@ -1,16 +1,15 @@
 //! Graphs as Mermaid flow charts, which GitHub and GitLab draw inside Markdown.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::io::Write as _;
 
 use super::{Started, at_end, text_per_window};
-use crate::base::ids::grouped;
 use crate::base::words;
 use crate::draw::picture::{options, short_name};
 use crate::draw::style::{Body, Change, Color, Style};
 use crate::export::sequence::Sequence;
 use crate::export::target::Target;
-use crate::view::{Item, ItemKind, Mark, SeenWindow, Shown, View};
+use crate::view::{Contents, ItemKind, Mark, SeenWindow, View};
 
 /// Begins the files, one per window; without `{n}` one file with the single window or the union of all.
 pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
@@ -22,7 +21,9 @@ pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<
         .unwrap_or(sequence.view);
     let target = target.clone();
     Ok(at_end(move || {
-        text_per_window(view, &target, |seen| chart(view, &style, seen))
+        text_per_window(view, &target, |sink, seen| {
+            sink.write_all(chart(view, &style, seen).as_bytes())
+        })
     }))
 }
 
@@ -31,17 +32,7 @@ pub(crate) const MANY: usize = 20;
 /// One window as a flow chart. Ids are numbers, so that no name can break the syntax.
 pub(crate) fn chart(view: &View, style: &Style, seen: &SeenWindow) -> String {
     let mut out = String::from("flowchart LR\n");
-    let spaces = view.namespaces.iter().enumerate();
-    let items = seen.items.iter().filter_map(|shown| {
-        let item = view.items.get(shown.item())?;
-        Some((item.cluster, (shown, item)))
-    });
-    let contents = Contents {
-        view,
-        spaces: grouped(spaces.map(|(at, space)| (space.parent, at))),
-        items: grouped(items),
-    };
-    contents.write(&mut out, None, 1);
+    members(&mut out, (view, &view.contents(seen)), None, 1);
     let mut marked = String::new();
     for (at, shown) in seen.arrows.iter().enumerate() {
         let Some(arrow) = view.arrows.get(shown.arrow()) else {
@@ -103,47 +94,36 @@ pub(crate) fn chart(view: &View, style: &Style, seen: &SeenWindow) -> String {
     out + &marked
 }
 
-/// The namespaces and items directly in each namespace, and outside of all.
-struct Contents<'a> {
-    view: &'a View,
-    spaces: BTreeMap<Option<usize>, Vec<usize>>,
-    items: BTreeMap<Option<usize>, Vec<(&'a Shown, &'a Item)>>,
-}
-
-impl Contents<'_> {
-    /// Writes those of a namespace. Namespaces nest at most 16 deep.
-    fn write(&self, out: &mut String, home: Option<usize>, depth: usize) {
-        let view = self.view;
-        let indent = "  ".repeat(depth);
-        for at in self.spaces.get(&home).into_iter().flatten() {
-            let space = &view.namespaces[*at];
-            let mut inside = String::new();
-            self.write(&mut inside, Some(*at), depth + 1);
-            if !inside.is_empty() {
-                let name = relative(view, home, &space.name);
-                let _ = write!(
-                    out,
-                    "{indent}subgraph s{at}[\"{name}\"]\n{inside}{indent}end\n{indent}class s{at} space\n"
-                );
-            }
-        }
-        for (shown, item) in self.items.get(&home).into_iter().flatten() {
-            let (open, close) = match item.kind {
-                ItemKind::Node => ("([", "])"),
-                _ if item.is_service => ("{{", "}}"),
-                ItemKind::Namespace | ItemKind::Group => ("[[", "]]"),
-                ItemKind::Topic => ("[", "]"),
-            };
-            let name = relative(view, home, &item.name);
-            let _ = writeln!(
-                out,
-                "{indent}i{}{open}\"{name}\"{close}:::{}",
-                shown.id,
-                item.kind.word()
-            );
-            if let Some(mark) = shown.mark {
-                let _ = writeln!(out, "{indent}class i{} {}", shown.id, mark.class());
-            }
+/// Writes the namespaces and items that are directly in a namespace.
+fn members(
+    out: &mut String,
+    (view, contents): (&View, &Contents<'_>),
+    home: Option<usize>,
+    depth: usize,
+) {
+    let indent = "  ".repeat(depth);
+    for at in contents.spaces.get(&home).into_iter().flatten() {
+        let name = relative(view, home, &view.namespaces[*at].name);
+        let _ = writeln!(out, "{indent}subgraph s{at}[\"{name}\"]");
+        members(out, (view, contents), Some(*at), depth + 1);
+        let _ = writeln!(out, "{indent}end\n{indent}class s{at} space");
+    }
+    for (shown, item) in contents.items.get(&home).into_iter().flatten() {
+        let (open, close) = match item.kind {
+            ItemKind::Node => ("([", "])"),
+            _ if item.is_service => ("{{", "}}"),
+            ItemKind::Namespace | ItemKind::Group => ("[[", "]]"),
+            ItemKind::Topic => ("[", "]"),
+        };
+        let name = relative(view, home, &item.name);
+        let _ = writeln!(
+            out,
+            "{indent}i{}{open}\"{name}\"{close}:::{}",
+            shown.id,
+            item.kind.word()
+        );
+        if let Some(mark) = shown.mark {
+            let _ = writeln!(out, "{indent}class i{} {}", shown.id, mark.class());
         }
     }
 }

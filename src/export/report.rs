@@ -229,7 +229,8 @@ fn nodes(mission: &Mission, view: &View, info: &Info) -> String {
     let all = mission.elements.nodes.with_ids();
     let all = all.filter(|(id, _)| shown.contains(&Element::Node(*id)));
     let rows = all.map(|(id, node)| {
-        let own = info.nodes.iter().find(|own| own.name == node.name.as_str());
+        let own = (info.nodes).binary_search_by_key(&node.name.as_str(), |own| &own.name);
+        let own = own.ok().map(|at| &info.nodes[at]);
         row(&[
             code(node.name.as_str()),
             seen(mission, &node.seen),
@@ -249,8 +250,8 @@ fn topics(mission: &Mission, view: &View, info: &Info) -> String {
     let all = mission.elements.topics.with_ids();
     let all = all.filter(|(id, _)| shown.contains(&Element::Topic(*id)));
     let rows = all.map(|(id, topic)| {
-        let mut own = info.topics.iter();
-        let own = own.find(|own| own.name == topic.name.as_str());
+        let own = (info.topics).binary_search_by_key(&topic.name.as_str(), |own| &own.name);
+        let own = own.ok().map(|at| &info.topics[at]);
         let types: Vec<String> = topic.types.iter().map(|t| code(t)).collect();
         row(&[
             code(topic.name.as_str()),
@@ -295,11 +296,7 @@ fn evidence(mission: &Mission, info: &Info) -> String {
         let _ = writeln!(out, "- to learn more: {}", plain(line));
     }
     for bag in mission.bags.iter().take(50) {
-        let state = if bag.complete {
-            "complete"
-        } else {
-            "incomplete"
-        };
+        let state = ["incomplete", "complete"][usize::from(bag.complete)];
         let _ = writeln!(
             out,
             "- {}: {}, {state}",

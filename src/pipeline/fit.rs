@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::compose::Composed;
 use super::{Drawing, Stage, Watch};
 use crate::base::geometry::Size;
+use crate::base::ids::grouped;
 use crate::base::name::lies_in;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words;
@@ -14,7 +15,7 @@ use crate::draw::style::Style;
 use crate::graph::Element;
 use crate::layout::{Layout, LayoutOptions, Plan};
 use crate::mission::Mission;
-use crate::view::{COMMON, Collapsible, ItemId, Mode, ViewOptions, headlines};
+use crate::view::{COMMON, ItemId, Mode, ViewOptions, headlines, inside};
 
 /// The style used to decide what is drawn.
 const PLAIN: &str = "light";
@@ -219,24 +220,26 @@ impl Fitting<'_> {
         loop {
             let mut options = self.options().clone();
             let view = &self.best.composed.view;
-            let is_new = |name: &Arc<str>| {
-                !options.collapse.contains(name) && !left.iter().any(|other| other.space == *name)
-            };
-            let candidates = view.collapsible(self.mission, &options);
-            let fresh = candidates.into_iter().filter(|c| is_new(&c.name));
-            let fresh: Vec<Collapsible> = fresh.collect();
+            let tried = left.iter().map(|other| &other.space);
+            let tried: BTreeSet<&Arc<str>> = tried.chain(&options.collapse).collect();
+            let mut fresh = view.collapsible(self.mission, &options);
+            fresh.retain(|candidate| !tried.contains(&candidate.name));
             if self.is_readable() || fresh.is_empty() {
                 return left;
             }
             let is_hopeless = self.best.text < self.drawing.readable() * HOPELESS;
             let before = options.collapse.len();
             let many = self.at_once(fresh.len());
+            let changing = view.holding(&reported);
+            let mut open: BTreeSet<Arc<str>> = options.expand.iter().cloned().collect();
             for candidate in fresh.into_iter().take(many) {
-                let mut outside = view.holding(&reported, &candidate.name);
-                outside.retain(|name| !is_hopeless && !options.expand.contains(name));
+                let outside = inside(&changing, &candidate.name).flatten().cloned();
+                let outside = outside.filter(|name| !is_hopeless && !open.contains(name));
+                let outside: Vec<Arc<str>> = outside.collect();
                 if outside.is_empty() || candidate.items >= outside.len() + FEWEST_STEADY {
                     options.collapse.push(Arc::clone(&candidate.name));
                     options.expand.extend(outside.iter().cloned());
+                    open.extend(outside.iter().cloned());
                 }
                 if !outside.is_empty() {
                     left.push(Spared {
@@ -281,12 +284,14 @@ impl Fitting<'_> {
     fn collapse_the_rest(&mut self, mut left: Vec<Spared>) {
         while !self.is_readable() && !left.is_empty() {
             let mut options = self.options().clone();
-            for Spared { space, outside } in left.drain(..self.at_once(left.len())) {
-                options.expand.retain(|kept| !outside.contains(kept));
-                if !options.collapse.contains(&space) {
-                    options.collapse.push(space);
-                }
-            }
+            let rest = left.drain(..self.at_once(left.len()));
+            let rest = rest.map(|of| (of.space, of.outside));
+            let (mut spaces, outside): (Vec<_>, Vec<_>) = rest.unzip();
+            let outside: BTreeSet<Arc<str>> = outside.into_iter().flatten().collect();
+            options.expand.retain(|kept| !outside.contains(kept));
+            let collapsed: BTreeSet<&Arc<str>> = options.collapse.iter().collect();
+            spaces.retain(|space| !collapsed.contains(space));
+            options.collapse.extend(spaces);
             self.show(options);
         }
     }
@@ -574,9 +579,9 @@ fn cropped(composed: &Composed, drawing: &Drawing) -> PageOptions {
 
 /// The collapsed namespaces as text, each with the number of changing elements kept outside.
 fn parts(collapsed: &[Arc<str>], kept: &[Arc<str>]) -> Vec<(Arc<str>, String)> {
+    let kept = grouped(kept.iter().map(|name| (&**name, ())));
     let reported = |name: &Arc<str>| {
-        let inside = |other: &&Arc<str>| lies_in(other, name);
-        let words = match kept.iter().filter(inside).count() {
+        let words = match inside(&kept, name).flatten().count() {
             0 => name.to_string(),
             many => format!("{name} except {} in it", words::count(many, "node")),
         };

@@ -18,7 +18,7 @@ use crate::draw::timeline::rows::{self, by_namespace, together};
 use crate::draw::timeline::{FigureSource, Timeline};
 use crate::draw::topic_timeline::TopicTimeline;
 use crate::export::sequence::{self, Choice, Drawings, FigureOptions, Sequence, Unfolded};
-use crate::export::{self, OneDrawing, Output, Written, run};
+use crate::export::{self, OneDrawing, Output, Written, mermaid, run};
 use crate::graph::window::default_period;
 use crate::layout::LayoutOptions;
 use crate::mission::Mission;
@@ -322,13 +322,14 @@ impl<'a> Showing<'a> {
             // Two such panels side by side fit a screen.
             self.drawing = self.drawing.clone().seen(Purpose::Readme);
         }
-        let composed = if is_drawn {
+        let mut composed = if is_drawn {
             fitted(mission, &self.drawing, watch)
         } else if self.outputs.iter().any(|o| o.format.is_viewed) {
             self.unplaced(&self.drawing)
         } else {
             Composed::default()
         };
+        let paired = self.paired(&mut composed);
         let (view, elements) = (&composed.view, &mission.elements);
         if is_drawn && view.items.is_empty() && elements.nodes.len() + elements.topics.len() > 0 {
             return Err(nothing(elements));
@@ -349,7 +350,6 @@ impl<'a> Showing<'a> {
         remarks.for_each(|text| self.remark(text));
         self.notices.extend(composed.notices.iter());
         let places = is_drawn.then(|| composed.places());
-        let paired = self.paired();
         let sequence = Sequence {
             places: places.as_ref(),
             picture: picture.as_ref().map_or(&(), |p| p as &dyn Drawings),
@@ -376,12 +376,19 @@ impl<'a> Showing<'a> {
     }
 
     /// The view with one line per pair of nodes, if an output is or contains a chart in which topics were not asked for.
-    fn paired(&self) -> Option<Composed> {
+    /// Of a large chart alone, it replaces the view of each topic, so that only one of the two is in memory.
+    fn paired(&self, composed: &mut Composed) -> Option<Composed> {
         let mut drawing = self.drawing.clone();
         let is_chart = |output: &Output| matches!(output.format.word, "mmd" | "md");
         let is_free = !drawing.view.keeps_topics && self.outputs.iter().any(is_chart);
         (drawing.view.mode, drawing.view.is_bundled) = (Mode::Nodes, true);
         drawing.view.is_picture = false;
+        let is_alone = self.outputs.iter().all(|o| o.format.word == "mmd");
+        if is_free && is_alone && composed.view.arrows.len() > mermaid::MANY {
+            *composed = Composed::default();
+            *composed = self.unplaced(&drawing);
+            return None;
+        }
         is_free.then(|| self.unplaced(&drawing))
     }
 

@@ -485,7 +485,14 @@ impl Frame {
         let longest = self.caption.iter().map(|p| p.names.len()).max();
         let longest = longest.unwrap_or(1).min(40);
         let mut best = (0, self.shortened(1, 1));
-        for phrases in (1..=self.caption.len()).rev() {
+        // No more phrases fit than their first names alone.
+        let first = |phrase: &Phrase| Words {
+            sign: None,
+            text: phrase.names.first().cloned().unwrap_or_default(),
+        };
+        let least: Vec<Words> = self.caption.iter().map(first).collect();
+        let most = (1..=least.len()).take_while(|phrases| fits(&least[..*phrases]));
+        for phrases in (1..=most.count()).rev() {
             for names in (1..=longest).rev() {
                 let reported = self.caption.iter().take(phrases);
                 let reported: usize = reported.map(|p| p.names.len().min(names)).sum();

@@ -9,7 +9,6 @@ use super::choose::{Selection, is_infrastructure};
 use super::fold::namespaces::{clusters, headlines};
 use super::fold::{self, ItemKey, Keys};
 use super::{AlsoHere, ArrowId, Item, ItemId, ItemKind, Namespace, ShownRuns, View, ViewOptions};
-use crate::base::name::lies_in;
 use crate::base::time::Stamp;
 use crate::graph::window::default_period;
 use crate::graph::{ById, Element, Elements, NodeId, Topic, TopicId, Wiring};
@@ -250,12 +249,12 @@ pub(crate) fn also_here(
     shown: impl IntoIterator<Item = ShownRuns>,
     namespaces: &[Namespace],
 ) -> Vec<AlsoHere> {
+    let places: BTreeMap<&str, usize> = namespaces.iter().map(|s| &*s.name).zip(0..).collect();
     let mut also: BTreeMap<Option<usize>, AlsoHere> = BTreeMap::new();
     let shown = shown.into_iter().map(Some).chain(std::iter::repeat(None));
     for (item, shown) in items.into_iter().zip(shown) {
-        let is_around = |space: &Namespace| lies_in(&item.name, &space.name);
-        // Children come after their parents.
-        let cluster = namespaces.iter().rposition(is_around);
+        let mut ends = item.name.rmatch_indices('/');
+        let cluster = ends.find_map(|(end, _)| places.get(&item.name[..end]).copied());
         let also = also.entry(cluster).or_default();
         also.cluster = cluster;
         also.items.push(item);

@@ -9,6 +9,7 @@ use super::{
     Arrow, ArrowId, ArrowKind, Counts, Headline, Item, ItemId, ItemKind, Mark, Shown, ShownRuns,
     View,
 };
+use crate::base::ids::grouped;
 use crate::base::name::{last_part, namespace};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{ById, Element};
@@ -320,23 +321,24 @@ impl WindowChanges {
         let parts = |id: &EventId| self.marks.parts.get(id).into_iter().flatten();
         let own = shown.events.iter();
         let own = own.flat_map(|id| std::iter::once(id).chain(parts(id)));
-        let events: Vec<&Event> = own.filter_map(|id| now.event(*id)).collect();
+        let events = grouped(own.filter_map(|id| {
+            let event = now.event(*id)?;
+            let topic = now.viewed.elements.ends(event.what).1?;
+            Some((&now.viewed.bundled[topic], event))
+        }));
+        let alive = [&self.before, &self.after].map(|items| items.topics(now.viewed, id));
         for row in &mut shown.topics {
-            let has = |items: &LivingItems| items.has_topic(now.viewed, id, row.topic);
-            let there = (has(&self.before), has(&self.after));
+            let there = alive.each_ref().map(|all| all.contains(&row.topic));
             match there {
-                (false, true) => row.mark = Some(Mark::Added),
-                (true, false) => row.mark = Some(Mark::Removed),
+                [false, true] => row.mark = Some(Mark::Added),
+                [true, false] => row.mark = Some(Mark::Removed),
                 _ => {
-                    let name = &arrow.topics[row.topic as usize];
-                    for event in &events {
-                        let topic = now.viewed.elements.ends(event.what).1;
-                        if topic.is_some_and(|topic| now.viewed.bundled[topic] == *name) {
-                            let (mark, rates) = changed(event);
-                            row.mark = Some(mark);
-                            if let Some(rates) = rates {
-                                then(&mut row.steps, rates);
-                            }
+                    let own = events.get(&arrow.topics[row.topic as usize]);
+                    for event in own.into_iter().flatten() {
+                        let (mark, rates) = changed(event);
+                        row.mark = Some(mark);
+                        if let Some(rates) = rates {
+                            then(&mut row.steps, rates);
                         }
                     }
                 }
@@ -346,9 +348,10 @@ impl WindowChanges {
 
     /// The number of headlines reported on a collapsed namespace or a bundle; `None` without any.
     fn inside(&self, shown: &Shown) -> Option<Box<Counts>> {
-        let reported = self.marks.headlines.iter();
-        let counts =
-            Counts::inside(reported.filter(|h| shown.events.binary_search(&h.event).is_ok()));
+        let all = &self.marks.headlines;
+        let reported = shown.events.iter();
+        let reported = reported.filter_map(|id| all.binary_search_by_key(id, |h| h.event).ok());
+        let counts = Counts::inside(reported.map(|at| &all[at]));
         (counts.total() > 0).then(|| Box::new(counts))
     }
 }

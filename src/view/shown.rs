@@ -412,7 +412,7 @@ impl ShownRunsWriter {
         }
         let all = &mut self.looks.distinct;
         let next = u32::try_from(all.len()).unwrap_or(AWAY - 1);
-        if all.is_empty() {
+        if all.len() <= FEW {
             all.reserve_exact(1);
         }
         if is_plain && all.len() > FEW {

@@ -9,6 +9,7 @@ use super::items::Viewed;
 use super::{
     Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Members, Shown, TopicRow, ViewOptions,
 };
+use crate::base::ids::grouped;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Confidence;
 use crate::graph::{ById, EdgeId, Element, Elements, PerElement, Row, State, TopicId};
@@ -65,14 +66,14 @@ impl LivingItems {
         self.alive.is(what)
     }
 
-    /// Whether a topic of a bundle exists on this line.
-    pub(crate) fn has_topic(&self, viewed: &Viewed<'_>, id: ArrowId, topic: u32) -> bool {
+    /// The topics of a bundle that exist on this line.
+    pub(crate) fn topics(&self, viewed: &Viewed<'_>, id: ArrowId) -> BTreeSet<u32> {
         let (arrow, pairs) = (&viewed.arrows[id], viewed.pairs.get(id));
-        let mut pairs = pairs.into_iter().flatten();
-        pairs.any(|pair| {
-            let row = viewed.row(arrow, *pair);
-            row.is_some_and(|row| row.0 == topic) && both_live(&self.alive, *pair)
-        })
+        let pairs = pairs.into_iter().flatten();
+        let alive = pairs.filter(|pair| both_live(&self.alive, **pair));
+        alive
+            .filter_map(|pair| Some(viewed.row(arrow, *pair)?.0))
+            .collect()
     }
 }
 
@@ -100,8 +101,8 @@ pub(crate) struct Now<'a> {
     sole: ById<TopicId, Option<EdgeId>>,
     /// The publications of each topic.
     senders: ById<TopicId, Vec<EdgeId>>,
-    /// The subscriptions that receive nothing, each from a time on.
-    starved: Vec<(Element, Span)>,
+    /// The times in which subscriptions receive nothing.
+    starved: BTreeMap<Element, Vec<Span>>,
 }
 
 impl<'a> Now<'a> {
@@ -124,7 +125,7 @@ impl<'a> Now<'a> {
             lives: (Alive::default(), Alive::default()),
             rows: PerElement::new(&mission.elements, |_| None),
             sole: mission.elements.sole_publishers(),
-            starved: starved(mission),
+            starved: grouped(starved(mission)),
         }
     }
 
@@ -170,10 +171,9 @@ impl<'a> Now<'a> {
             one.is_paused = true;
             one.state = one.state.max(State::Silent);
         }
-        let starves = |(edge, span): &(Element, Span)| {
-            *edge == what && span.start < self.span.end && self.span.start < span.end
-        };
-        one.is_starved = self.starved.iter().any(starves);
+        let is_now = |span: &Span| span.start < self.span.end && self.span.start < span.end;
+        let starved = self.starved.get(&what);
+        one.is_starved = starved.is_some_and(|spans| spans.iter().any(is_now));
         if let Some(topic) = self.waits_for(what) {
             one.is_paused = true;
             one.state = self.state_of_waiting(topic).max(one.state);

@@ -190,7 +190,8 @@ def launched(many, folder):
 def drawn(many, folder):
     """A chain of as many nodes and topics of a DOT file without blanks, beside a recording of three nodes."""
     chain = "->".join(f'"/{"nt"[k % 2]}{k // 2}"' for k in range(2 * many))
-    (folder / "all.dot").write_text("digraph{" + chain + "}")
+    shapes = "".join(f'"/n{k}"[shape=ellipse];"/t{k}"[shape=box];' for k in range(many))
+    (folder / "all.dot").write_text("digraph{" + shapes + chain + "}")
     return [*nodes(3, folder), "--topology", folder / "all.dot"]
 
 

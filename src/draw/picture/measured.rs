@@ -187,10 +187,10 @@ impl Measurer<'_> {
         if item.kind == ItemKind::Namespace {
             let is_open =
                 |other: &Item| other.kind == ItemKind::Node && other.cluster == item.cluster;
-            name = match (&*item.name == inside, self.view.items.iter().any(is_open)) {
-                (true, true) => "all others".to_owned(),
-                (true, false) => "all nodes".to_owned(),
-                (false, _) => name + "/…",
+            name = match &*item.name == inside {
+                true if self.view.items.iter().any(is_open) => "all others".to_owned(),
+                true => "all nodes".to_owned(),
+                false => name + "/…",
             };
         }
         let widest = WIDEST.0.max(WIDEST.1 * body.size);

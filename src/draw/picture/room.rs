@@ -27,23 +27,21 @@ pub(super) fn place_titles(
     let pieces = lines.iter().flat_map(|line| line.windows(2));
     let pieces = pieces.filter_map(|ends| Rect::of_points(ends.iter().copied()));
     let borders = titles.iter().flat_map(|(frame, ..)| border(frame));
-    let taken: Vec<Rect> = pieces
+    let mut taken: Vec<Rect> = pieces
         .chain(borders)
         .chain(few.iter().filter_map(ArrowPath::label_area))
         .chain(cards.iter().map(|card| card.place))
         .collect();
+    taken.sort_by(|a, b| a.x.total_cmp(&b.x));
     let placed = titles.iter().map(|&(frame, size, has_footer)| {
         let (left, right) = (frame.x + INSET * scale, frame.right() - INSET * scale);
         let top = Rect::new(frame.x, frame.y, frame.w, size.h + CLEAR * scale);
         let bottom = top.moved(Point::new(0.0, frame.h - top.h - CLEAR * scale));
         let free = |strip: &Rect| {
-            let below = taken.iter().filter(|rect| {
-                rect.y < strip.bottom() && rect.bottom() > strip.y && rect.x < strip.right()
-            });
-            let mut below: Vec<&Rect> = below.collect();
-            below.sort_by(|a, b| a.x.total_cmp(&b.x));
+            let before = taken.iter().take_while(|rect| rect.x < strip.right());
+            let is_level = |rect: &&Rect| rect.y < strip.bottom() && rect.bottom() > strip.y;
             let mut x = left;
-            for rect in below {
+            for rect in before.filter(is_level) {
                 if rect.x > x + size.w + CLEAR * scale {
                     break;
                 }

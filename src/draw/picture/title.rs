@@ -143,9 +143,9 @@ impl<'a> Title<'a> {
             |words: &[Words], most: f64| self.width(&joined(words), size, Weight::SemiBold) <= most;
         // The number of phrases in the first line.
         let first = |words: &[Words]| {
-            let mut ends = (1..=words.len()).rev();
-            let first = ends.find(|end| fits(&words[..*end], room.0))?;
-            fits(&words[first..], room.1).then_some(first)
+            let ends: Vec<usize> = (1..=words.len()).collect();
+            let first = ends.partition_point(|end| fits(&words[..*end], room.0));
+            (first > 0 && fits(&words[first..], room.1)).then_some(first)
         };
         let mut words = frame.fitting(|words| first(words).is_some());
         let mut second = words.split_off(first(&words).unwrap_or(words.len()));

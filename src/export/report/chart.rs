@@ -25,11 +25,8 @@ pub(super) fn chart<'a>(mut view: &'a View, paired: Option<&'a View>) -> String 
     if let Some(paired) = paired.filter(|_| found.as_ref().is_some_and(is_large)) {
         (view, found) = (paired, changed(paired));
     }
-    let Some((seen, left_out)) = found else {
-        return String::new();
-    };
     // The picture's style may be dark, but Markdown has any background.
-    let Ok(style) = Style::builtin(BUILTIN[0].0) else {
+    let (Some((seen, left_out)), Ok(style)) = (found, Style::builtin(BUILTIN[0].0)) else {
         return String::new();
     };
     let chart = mermaid::chart(view, &style, &seen);

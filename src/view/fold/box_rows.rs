@@ -114,11 +114,10 @@ impl View {
             look.is_some_and(|look| !is_infrastructure || look.mark.is_some())
         };
         let all = self.looks_of(lines).chain([looks]);
-        let mut windows = all
-            .flat_map(ShownRuns::runs)
-            .map(|run| run.0 as usize)
-            .filter(needs_line);
-        windows.all(|k| reported(self.looks_of(lines).filter_map(|line| line.at(k))).is_some())
+        let windows = all.flat_map(ShownRuns::runs).map(|run| run.0 as usize);
+        let windows: BTreeSet<usize> = windows.filter(needs_line).collect();
+        let mut windows = windows.into_iter();
+        windows.all(|k| self.looks_of(lines).any(|line| line.at(k).is_some()))
     }
 
     fn looks_of<'a>(&'a self, lines: &'a [ArrowId]) -> impl Iterator<Item = &'a ShownRuns> + Clone {
@@ -160,14 +159,14 @@ impl View {
     /// be empty. Returns the boxes that are never shown.
     fn hide_unnamed(&mut self, rows: &[BoxRow]) -> Vec<ItemId> {
         let mut never = Vec::new();
+        let linked: BTreeSet<ItemId> = self.arrows.iter().flat_map(|a| [a.from, a.to]).collect();
+        let own = rows.iter().filter(|row| !row.is_infrastructure);
+        let own = grouped(own.map(|row| (row.owner, &row.shown)));
         for (at, looks) in self.items.ids().zip(self.items_shown.iter_mut()) {
-            let is_linked = |arrow: &Arrow| arrow.from == at || arrow.to == at;
-            let is_unnamed = is_unnamed(&self.items[at].name);
-            if !is_unnamed || self.arrows.iter().any(is_linked) {
+            if !is_unnamed(&self.items[at].name) || linked.contains(&at) {
                 continue;
             }
-            let is_own = |row: &&BoxRow| row.owner == at && !row.is_infrastructure;
-            let own = rows.iter().filter(is_own).map(|row| &row.shown);
+            let own = own.get(&at).into_iter().flatten().copied();
             *looks = ShownRuns::made_of(own.clone().chain([&*looks]), |k| {
                 let is_there = own.clone().any(|shown| shown.at(k).is_some());
                 looks.at(k).filter(|_| is_there).cloned()

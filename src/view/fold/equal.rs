@@ -9,6 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{Hash, Hasher as _};
 use std::sync::Arc;
 
+use super::namespaces::inside;
 use super::{Fold, ItemKey, Keys};
 use crate::base::ids::grouped;
 use crate::base::name::{is_within, namespace};
@@ -50,7 +51,7 @@ impl Fleet {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Fleets {
     pub(crate) all: Vec<Fleet>,
-    /// The index of each namespace's fleet, by the name of the namespace.
+    /// The index of each namespace's fleet, by the name of the namespace, and by the name that the fleet is drawn under.
     place: BTreeMap<Arc<str>, usize>,
 }
 
@@ -87,16 +88,17 @@ impl Fleets {
             found.extend(largest.filter(is_fleet).map(|members| (stem, members)));
         }
         keep_linked(&mut found, elements);
+        let all = grouped(names(elements));
         let mut fleets = Self::default();
         for (stem, mut members) in found {
             members.sort_by_key(|m| (m.len(), *m));
             let digits = members.last().map_or(1, |m| m.len() - stem.len());
             let name = format!("{stem}{}", "N".repeat(digits));
-            if names(elements).any(|(other, _)| is_within(other, &name)) {
+            if all.contains_key(&*name) || inside(&all, &name).next().is_some() {
                 continue;
             }
-            for member in &members {
-                fleets.place.insert((*member).into(), fleets.all.len());
+            for member in members.iter().copied().chain([&*name]) {
+                fleets.place.insert(member.into(), fleets.all.len());
             }
             let nodes_or_topics = |space: &&str| {
                 let inside = spaces[space].iter().map(|(_, element)| *element);
@@ -128,7 +130,14 @@ impl Fleets {
 
     /// Whether an element drawn under this name is part of a fleet.
     pub(crate) fn has(&self, drawn: &str) -> bool {
-        self.all.iter().any(|fleet| is_within(drawn, &fleet.name))
+        let around = drawn.match_indices('/').map(|(end, _)| &drawn[..end]);
+        around.chain([drawn]).any(|name| self.named(name).is_some())
+    }
+
+    /// The index of the fleet that is drawn under this name.
+    pub(crate) fn named(&self, drawn: &str) -> Option<usize> {
+        let at = self.place.get(drawn).copied();
+        at.filter(|at| *self.all[*at].name == *drawn)
     }
 }
 

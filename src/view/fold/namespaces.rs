@@ -4,8 +4,10 @@
 //! comes from outside, stays beside it.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Bound;
 use std::sync::Arc;
 
+use crate::base::ids::grouped;
 use crate::base::name::{lies_in, namespace};
 use crate::graph::Element;
 use crate::mission::Mission;
@@ -50,14 +52,12 @@ impl<'a> Collapse<'a> {
                 folded.entry(space).or_default()[at] += 1;
             }
         }
-        let is_rest = |space: &str| {
-            let mut open = self.expand.iter();
-            open.any(|name| lies_in(name, space))
-        };
+        let open: BTreeMap<&str, &str> = self.expand.iter().map(|name| (*name, *name)).collect();
+        let is_rest = |space| inside(&open, space).next().is_some();
         let single = folded
             .into_iter()
             .filter(|(space, [nodes, topics])| nodes + topics < 2 || *nodes == 1 && is_rest(space));
-        let single: Vec<&str> = single.map(|(space, _)| space).collect();
+        let single: BTreeSet<&str> = single.map(|(space, _)| space).collect();
         self.collapse.retain(|space| !single.contains(space));
     }
 
@@ -137,16 +137,25 @@ pub(crate) fn changed(mission: &Mission) -> BTreeMap<&str, usize> {
     changed
 }
 
+/// The values of the names that lie in a namespace.
+pub(crate) fn inside<'m, V>(
+    names: &'m BTreeMap<&str, V>,
+    space: &'m str,
+) -> impl Iterator<Item = &'m V> {
+    let below = format!("{space}/");
+    let after = names.range::<str, _>((Bound::Included(below.as_str()), Bound::Unbounded));
+    let inside = after.take_while(move |(name, _)| lies_in(name, space));
+    inside.map(|(_, value)| value)
+}
+
 impl View {
-    /// The boxes inside a namespace that contain one of these elements.
-    pub(crate) fn holding(&self, reported: &BTreeSet<Element>, space: &str) -> Vec<Arc<str>> {
-        let items = self.items.iter();
-        let inside = items.filter(|item| lies_in(&item.name, space));
+    /// The boxes, except of namespaces, that contain one of these elements, by name.
+    pub(crate) fn holding(&self, reported: &BTreeSet<Element>) -> BTreeMap<&str, Vec<Arc<str>>> {
         let changes = |item: &&Item| item.members.iter().any(|member| reported.contains(member));
-        let open = inside.filter(|item| item.kind != ItemKind::Namespace);
-        open.filter(changes)
-            .map(|item| Arc::clone(&item.name))
-            .collect()
+        let open = self.items.iter();
+        let open = open.filter(|item| item.kind != ItemKind::Namespace);
+        let changing = open.filter(changes);
+        grouped(changing.map(|item| (&*item.name, Arc::clone(&item.name))))
     }
 
     /// The namespaces that could be collapsed, in the order of collapsing: those with fewest changes per box,
@@ -169,24 +178,16 @@ impl View {
         }
         let most = self.items.len() * COMMON.0 / COMMON.1;
         sizes.retain(|space, size| *size > 1 && *size <= most && !open.contains(space));
-        let inner = |space: &str| {
-            let below = format!("{space}/");
-            let mut after = sizes.range(below.as_str()..);
-            !after.next().is_some_and(|(s, _)| s.starts_with(&below))
-        };
         let mut all: Vec<(bool, Collapsible)> = sizes
             .iter()
             .map(|(space, size)| {
-                let below = format!("{space}/");
-                let inside = changed.range(below.as_str()..);
-                let inside = inside.take_while(|(name, _)| name.starts_with(&below));
                 let own = changed.get(space).copied().unwrap_or_default();
                 let candidate = Collapsible {
                     name: Arc::from(*space),
                     items: *size,
-                    headlines: own + inside.map(|(_, n)| n).sum::<usize>(),
+                    headlines: own + inside(&changed, space).sum::<usize>(),
                 };
-                (!inner(space), candidate)
+                (inside(&sizes, space).next().is_some(), candidate)
             })
             .collect();
         all.sort_by(|a, b| {
@@ -356,8 +357,9 @@ mod tests {
     fn changing_elements_can_stay_outside_a_collapsed_box() {
         let mission = mission(&["/a/x>/a/t /a/y>/a/u /a/z>/a/u", "/a/x>/a/t /a/z>/a/u"]);
         let whole = outline(&mission, &options(&[], &[]));
-        let open = whole.holding(&headlines(&mission).collect(), "/a");
-        assert_eq!(open, ["/a/y".into()]);
+        let open = whole.holding(&headlines(&mission).collect());
+        let open: Vec<&Arc<str>> = inside(&open, "/a").flatten().collect();
+        assert_eq!(open, [&Arc::from("/a/y")]);
         let view = outline(&mission, &options(&["/a"], &["/a/y"]));
         let boxes: Vec<(&str, usize)> = (view.items.iter())
             .map(|item| (&*item.name, item.members.len()))

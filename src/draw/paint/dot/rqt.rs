@@ -6,14 +6,15 @@
 //! edges must be at the top level, or they appear twice.
 
 use std::fmt::Write as _;
+use std::io::{self, Write};
 
 use super::names::{escape_name, quoted};
 use super::{DotView, label, line, pen_width, rate};
-use crate::base::geometry::{Point, Rect};
+use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::paint::xml::hundredth;
 use crate::graph::{Element, Id as _};
 use crate::layout::Route;
-use crate::view::{Arrow, ArrowKind, Item, ItemId, ItemKind, Mark, SeenWindow, Shown};
+use crate::view::{Arrow, ArrowKind, Contents, Item, ItemId, ItemKind, Mark, SeenWindow, Shown};
 
 /// The length of an arrow's head in points, as Graphviz draws it.
 const HEAD: f64 = 10.0;
@@ -23,49 +24,46 @@ const POINTS_PER_INCH: f64 = 72.0;
 
 impl DotView<'_> {
     /// One window, or the [`union`](crate::view::union()) of all.
-    pub(crate) fn write(&self, seen: &SeenWindow) -> String {
+    ///
+    /// # Errors
+    /// Where the system refuses.
+    pub(crate) fn write(&self, out: &mut impl Write, seen: &SeenWindow) -> io::Result<()> {
         let size = self.layout.size;
         let bb = format!("0,0,{},{}", number(size.w), number(size.h));
-        let mut out = format!(
-            "digraph graphname {{\n graph [bb=\"{bb}\", compound=true, rank=same, rankdir=LR, ranksep=0.2];\n"
-        );
-        let inhabited = self.view.inhabited(seen);
-        self.members(&mut out, seen, &inhabited, None, " ");
-        for shown in &seen.arrows {
-            self.arrow(&mut out, shown);
-        }
-        out.push_str("}\n");
-        out
+        writeln!(
+            out,
+            "digraph graphname {{\n graph [bb=\"{bb}\", compound=true, rank=same, rankdir=LR, ranksep=0.2];"
+        )?;
+        self.members(out, &self.view.contents(seen), None, " ")?;
+        let arrows = seen.arrows.iter();
+        let mut arrows = arrows.filter_map(|shown| self.arrow(shown));
+        arrows.try_for_each(|arrow| out.write_all(arrow.as_bytes()))?;
+        out.write_all(b"}\n")
     }
 
     /// Writes the namespaces and items that are directly in a namespace, given by its index. Namespaces nest 16 deep at
     /// most.
     fn members(
         &self,
-        out: &mut String,
-        seen: &SeenWindow,
-        inhabited: &[bool],
+        out: &mut impl Write,
+        contents: &Contents<'_>,
         home: Option<usize>,
         indent: &str,
-    ) {
-        for (at, space) in self.view.namespaces.iter().enumerate() {
-            if space.parent != home || !inhabited[at] {
-                continue;
-            }
-            let (id, text) = (&self.ids.namespaces[at], self.cluster(at, &space.name));
-            let _ = writeln!(out, "{indent}subgraph {id} {{ graph [{text}];");
-            self.members(out, seen, inhabited, Some(at), &format!("{indent} "));
-            let _ = writeln!(out, "{indent}}}");
+    ) -> io::Result<()> {
+        for at in contents.spaces.get(&home).into_iter().flatten() {
+            let name = &self.view.namespaces[*at].name;
+            let (id, text) = (&self.ids.namespaces[*at], self.cluster(*at, name));
+            writeln!(out, "{indent}subgraph {id} {{ graph [{text}];")?;
+            self.members(out, contents, Some(*at), &format!("{indent} "))?;
+            writeln!(out, "{indent}}}")?;
         }
-        for shown in &seen.items {
+        for (shown, item) in contents.items.get(&home).into_iter().flatten() {
             let at = shown.id as usize;
-            let item = self.view.items.get(shown.item());
-            if let Some(item) = item.filter(|item| item.cluster == home) {
-                let (id, place) = (&self.ids.items[at], self.layout.boxes[at]);
-                let text = self.item(item, place, shown);
-                let _ = writeln!(out, "{indent}{id} [{text}];");
-            }
+            let (id, place) = (&self.ids.items[at], self.layout.boxes[at]);
+            let text = self.item(item, place, shown);
+            writeln!(out, "{indent}{id} [{text}];")?;
         }
+        Ok(())
     }
 
     fn cluster(&self, at: usize, name: &str) -> String {
@@ -74,8 +72,7 @@ impl DotView<'_> {
             .plan
             .clusters
             .get(at)
-            .map(|c| c.title)
-            .unwrap_or_default();
+            .map_or_else(Size::default, |c| c.title);
         let (top, bottom) = (self.up(place.y), self.up(place.bottom()));
         let bb = [place.x, bottom, place.right(), top].map(number).join(",");
         let lp = Point::new(
@@ -111,19 +108,12 @@ impl DotView<'_> {
         out
     }
 
-    fn arrow(&self, out: &mut String, shown: &Shown) {
+    fn arrow(&self, shown: &Shown) -> Option<String> {
         let at = shown.arrow();
-        let (Some(arrow), Some(route)) =
-            (self.view.arrows.get(at), self.layout.routes.get(at.at()))
-        else {
-            return;
-        };
+        let (arrow, route) = (self.view.arrows.get(at)?, self.layout.routes.get(at.at())?);
         let ids = &self.ids.items;
-        let (Some(from), Some(to)) = (ids.get(arrow.from.at()), ids.get(arrow.to.at())) else {
-            return;
-        };
-        let _ = write!(
-            out,
+        let (from, to) = (ids.get(arrow.from.at())?, ids.get(arrow.to.at())?);
+        let mut out = format!(
             " {from} -> {to} [pos=\"{}\", penwidth={}, style={}",
             self.spline(arrow, route),
             pen_width(shown),
@@ -140,8 +130,8 @@ impl DotView<'_> {
             let _ = write!(out, ", color=\"{colour}\"");
         }
         let _ = write!(out, ", edgetooltip={}", quoted(&self.tooltip(arrow, shown)));
-        self.extras(out, shown, &arrow.members);
-        out.push_str("];\n");
+        self.extras(&mut out, shown, &arrow.members);
+        Some(out + "];\n")
     }
 
     /// Our own attributes, which loaders ignore.
@@ -202,22 +192,16 @@ impl DotView<'_> {
 
     /// The quality of service of a single topic.
     fn qos(&self, members: &[Element]) -> Option<String> {
-        let all = self.elements;
-        let (Some(_), Some(topic)) = all.ends(*members.first()?) else {
-            return None;
-        };
-        let qos = all.topics.get(topic)?.qos.as_ref()?;
+        let topic = self.elements.ends(*members.first()?).1?;
+        let qos = self.elements.topics.get(topic)?.qos.as_ref()?;
         (!qos.is_empty()).then(|| qos.to_string())
     }
 
     /// The route of an edge: its tip, then its curve up to the arrow's head.
     fn spline(&self, arrow: &Arrow, route: &Route) -> String {
         let place = |id: ItemId| {
-            self.layout
-                .boxes
-                .get(id.at())
-                .map(Rect::centre)
-                .unwrap_or_default()
+            let place = self.layout.boxes.get(id.at());
+            place.map_or_else(Point::default, Rect::centre)
         };
         let mut points = vec![route.start];
         points.extend(route.curves.iter().flatten());
@@ -280,7 +264,9 @@ mod tests {
         let (view, _) = view(&mission, options);
         let style = Style::builtin("light").unwrap();
         let drawing = DotView::new(&mission, &view, style, &Fonts::bundled());
-        drawing.write(&view.seen(view.frames.len() - 1))
+        let mut out = Vec::new();
+        (drawing.write(&mut out, &view.seen(view.frames.len() - 1))).unwrap();
+        String::from_utf8(out).unwrap()
     }
 
     /// The line that begins with this, without indent.
