@@ -181,7 +181,11 @@ impl<'a> TopicTimeline<'a> {
         canvas.begin("why");
         let wide = self.options.size.w / self.scale - 2.0 * self.drawer.left;
         let why = self.why();
-        let window = ["", "; frame: this window"][usize::from(is_window)];
+        let window = if is_window {
+            "; frame: this window"
+        } else {
+            ""
+        };
         let signs = format!("{why}. Tick: first message; cross: last{window}.");
         let (reason, _) = why.split_once("; ").unwrap_or((why, ""));
         let texts = [&signs, why, reason].into_iter();

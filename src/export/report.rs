@@ -296,7 +296,11 @@ fn evidence(mission: &Mission, info: &Info) -> String {
         let _ = writeln!(out, "- to learn more: {}", plain(line));
     }
     for bag in mission.bags.iter().take(50) {
-        let state = ["incomplete", "complete"][usize::from(bag.complete)];
+        let state = if bag.complete {
+            "complete"
+        } else {
+            "incomplete"
+        };
         let _ = writeln!(
             out,
             "- {}: {}, {state}",

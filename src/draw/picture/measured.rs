@@ -187,10 +187,12 @@ impl Measurer<'_> {
         if item.kind == ItemKind::Namespace {
             let is_open =
                 |other: &Item| other.kind == ItemKind::Node && other.cluster == item.cluster;
-            name = match &*item.name == inside {
-                true if self.view.items.iter().any(is_open) => "all others".to_owned(),
-                true => "all nodes".to_owned(),
-                false => name + "/…",
+            name = if *item.name != *inside {
+                name + "/…"
+            } else if self.view.items.iter().any(is_open) {
+                "all others".to_owned()
+            } else {
+                "all nodes".to_owned()
             };
         }
         let widest = WIDEST.0.max(WIDEST.1 * body.size);
