@@ -268,7 +268,7 @@ fn is_python(bytes: &[u8]) -> bool {
 /// # Errors
 /// If the folder itself cannot be read; unreadable files inside are left out.
 fn of_folder(folder: &Path) -> Result<Files> {
-    fs::read_dir(folder).map_err(Error::io("read_bytes", folder))?;
+    fs::read_dir(folder).map_err(Error::io("read", folder))?;
     let mut files = Files::default();
     let mut seen = 0_usize;
     let mut open = vec![(folder.to_owned(), String::new(), 0)];
