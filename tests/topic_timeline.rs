@@ -186,6 +186,12 @@ fn a_mission_in_one_window_has_rates_while_they_were_sent() {
     let topics = svg_of("topics");
     assert!(topics.contains(">1 → 0.25 Hz<") && topics.contains(">3 msg<"));
     assert!(!topics.contains("playhead"));
+    // Every node that started during the mission is green.
+    assert!(
+        topics.contains(
+            "#00795C\">/amcl, /docking, /gripper, /nav/controller, /nav/planner, /teleop<"
+        )
+    );
     assert!(svg_of("nodes").contains(">scan 5 Hz<"));
 }
 

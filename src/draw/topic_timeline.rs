@@ -232,14 +232,15 @@ impl<'a> TopicTimeline<'a> {
     ) {
         let elements = &self.source.mission.elements;
         let is_known = |id: &NodeId| !elements.seen(Element::Node(*id)).evidence.is_guess();
-        let news = frame.headlines.iter().filter_map(|h| {
-            let color = match h.kind {
+        let news = self.source.mission.log.headlines(frame.span);
+        let news = news.filter_map(|(_, event)| {
+            let color = match event.kind {
                 Kind::Started => ink::ADDED,
                 Kind::Stopped => ink::REMOVED,
                 Kind::Restarted => ink::CHANGED,
                 _ => return None,
             };
-            Some((h.what, color))
+            Some((event.what, color))
         });
         let news: BTreeMap<Element, Color> = news.collect();
         let color = |id: &NodeId| {
