@@ -171,11 +171,11 @@ pub const SOURCES: &[Source] = sources! {
     "qos" "offered quality of service in ROS 2 recordings"
         { announced: Some(connection::announced), conclude: &[connection::conclude_offers] }
     "parameter_events" "`rcl_interfaces/msg/ParameterEvent`"
-        { reads: &[(&[events::SHAPE], Parameters(events::read_node))] }
+        { reads: &[(&[events::PARAMETER_EVENT], Parameters(events::read_node))] }
     "qos_overrides" "`qos_overrides.<topic>` in parameter events, which rclcpp declares with each end"
-        { reads: &[(&[events::SHAPE], Parameters(events::read_overrides))] }
+        { reads: &[(&[events::PARAMETER_EVENT], Parameters(events::read_overrides))] }
     "sim_time" "`use_sim_time` in parameter events, in ROS 1 stamps in the time of `/clock`: such a node subscribes to it"
-        { reads: &[(&[events::SHAPE], Parameters(sim_time::read_parameters)), (&[sim_time::CLOCK], Payload(sim_time::read_clock))],
+        { reads: &[(&[events::PARAMETER_EVENT], Parameters(sim_time::read_parameters)), (&[sim_time::CLOCK], Payload(sim_time::read_clock))],
           conclude: &[sim_time::conclude],
           own: true }
     "links" "log records of roscpp about its connections, and of recorders about the topics they find"

@@ -535,8 +535,8 @@ fn read_metadata(folder: &Path) -> Result<Option<Metadata>, String> {
     }
     let mut bytes = Vec::new();
     let file = File::open(&path).map_err(|e| e.to_string())?;
-    let read_metadata = file.take(YAML as u64).read_to_end(&mut bytes);
-    read_metadata.map_err(|e| e.to_string())?;
+    let read = file.take(YAML as u64).read_to_end(&mut bytes);
+    read.map_err(|e| e.to_string())?;
     let data = yaml::parse(&String::from_utf8_lossy(&bytes))
         .map_err(|e| format!("line {}: {}", e.at.line, e.reason))?;
     let root = data.get("rosbag2_bagfile_information");

@@ -38,10 +38,13 @@ pub(super) fn still(mut view: View, mission: &Mission) -> View {
         *looks = ShownRuns::of([shown.as_ref()]);
     };
     for row in &mut view.rows {
-        // The topics of a hub carry more than a row of it.
-        let members = Some(&row.item.members[..]).filter(|_| !row.is_infrastructure);
-        let members = members.unwrap_or_default();
-        join(&mut row.shown, &|shown| rates.of_topics(members, shown));
+        join(&mut row.shown, &|shown| {
+            if row.is_infrastructure {
+                shown
+            } else {
+                rates.of_topics(&row.item.members, shown)
+            }
+        });
     }
     let also = view.also.iter_mut();
     let also = also.flat_map(|also| also.items.iter().zip(&mut also.shown));

@@ -31,7 +31,7 @@ const APART: f64 = 2.3;
 const WIDE: f64 = 150.0;
 /// The least share of a page that the time takes beside the types of topics: with less, the types are left out, as the page is about times.
 const LEAST_TIME: f64 = 0.45;
-/// The largest share of a page that the rates take, if it is more than 12 mm: on a column of a journal, `10 → 5 → 10 → 5 Hz` took a
+/// The largest share of a page that the rates take, if it is more than they have at least: on a column of a journal, `10 → 5 → 10 → 5 Hz` took a
 /// third, and the time a quarter.
 const MOST_RATES: f64 = 0.24;
 /// The most names that are written for a row, and beside it.
@@ -212,8 +212,8 @@ impl Drawer {
         if density == Density::Page {
             let width = |text: String| canvas.width(&text, Type::Small) + 1.4;
             let written = timeline.rows.iter().map(Row::rates);
-            rates = written.map(width).fold(rates, f64::max);
-            rates = rates.min((MOST_RATES * place.w).max(12.0));
+            let widest = written.map(width).fold(rates, f64::max);
+            rates = widest.min(rates.max(MOST_RATES * place.w));
             let types = timeline.rows.iter().map(|row| row.beside[1].join(", "));
             beside = types.map(width).fold(0.0, f64::max).min(beside);
         }

@@ -10,7 +10,7 @@ use crate::evidence::observation::{Confidence, Observation};
 use crate::evidence::source::SourceContext;
 
 /// `rcl_interfaces/msg/ParameterEvent`.
-pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2(
+pub(crate) const PARAMETER_EVENT: MessageLayout = MessageLayout::ros2(
     "rcl_interfaces/ParameterEvent",
     "time stamp;string node;Parameter[] new_parameters;Parameter[] changed_parameters;Parameter[] deleted_parameters
      Parameter: string name;ParameterValue value

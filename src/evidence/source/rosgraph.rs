@@ -326,7 +326,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
 pub(crate) const PARTICIPANT: MessageLayout =
     MessageLayout::ros2("rmw_dds_common/ParticipantEntitiesInfo", "");
 
-/// The participant of a participant: namespace and name.
+/// The nodes of a participant: namespace and name.
 type ParticipantNodes<'a> = Vec<(&'a str, &'a str)>;
 
 pub(crate) fn read_participant(
@@ -334,10 +334,10 @@ pub(crate) fn read_participant(
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     let mut long = payload.clone();
-    let (id, participant) = participant(payload, 16).or_else(|_| participant(&mut long, 24))?;
+    let (id, nodes) = participant(payload, 16).or_else(|_| participant(&mut long, 24))?;
     let id = hex_of(id);
     let group = context.name(&format!("participant {id}"));
-    for (space, name) in participant {
+    for (space, name) in nodes {
         let full = format!("{}/{name}", space.trim_end_matches('/'));
         let node = context.name(&full);
         let words = || format!("{full} is a node of participant {id}");
@@ -347,15 +347,15 @@ pub(crate) fn read_participant(
     Ok(())
 }
 
-/// The participant and its participant, if identifiers of `gid` bytes use the payload up exactly.
+/// The participant and its nodes, if identifiers of `gid` bytes use the payload up exactly.
 fn participant<'a>(
     payload: &mut PayloadCursor<'a>,
     gid: usize,
 ) -> cursor::PayloadResult<(&'a [u8], ParticipantNodes<'a>)> {
     let id = payload.bytes(gid)?;
-    let mut participant = Vec::new();
+    let mut nodes = Vec::new();
     for _ in 0..payload.length(16)? {
-        participant.push((payload.string()?, payload.string()?));
+        nodes.push((payload.string()?, payload.string()?));
         for _ in 0..2 {
             for _ in 0..payload.length(gid)? {
                 payload.bytes(gid)?;
@@ -363,5 +363,5 @@ fn participant<'a>(
         }
     }
     payload.finish()?;
-    Ok((id, participant))
+    Ok((id, nodes))
 }
