@@ -31,7 +31,7 @@ pub(crate) use event_log::EventId;
 pub use event_log::EventLog;
 
 /// One window; its graph is in [`Mission::graphs`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Window {
     /// The index, counted from 0.

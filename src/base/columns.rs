@@ -15,6 +15,22 @@ pub(crate) struct Column {
     pub(crate) gives: (u8, u8),
 }
 
+impl Column {
+    pub(crate) const fn new(
+        head: &'static str,
+        is_right: bool,
+        least: usize,
+        gives: (u8, u8),
+    ) -> Self {
+        Self {
+            head,
+            is_right,
+            least,
+            gives,
+        }
+    }
+}
+
 /// The minimum width of a column that does not shrink.
 pub(crate) const WHOLE: usize = usize::MAX;
 
@@ -61,18 +77,15 @@ pub(crate) fn table(columns: &[Column], rows: &[Vec<Cell>], width: Option<usize>
     }
     let natural = |at: usize| {
         let cells = rows.iter().filter_map(|row| row.get(at)).map(Cell::width);
-        cells
-            .max()
-            .unwrap_or(0)
-            .max(columns[at].head.chars().count())
+        let head = columns[at].head.chars().count();
+        cells.max().unwrap_or(0).max(head)
     };
     let mut widths: Vec<usize> = (0..columns.len()).map(natural).collect();
     if let Some(width) = width {
         shrink(columns, &mut widths, width);
     }
-    let cuts: Vec<usize> = (0..columns.len())
-        .map(|at| cut(rows, at, widths[at]))
-        .collect();
+    let cuts = (0..columns.len()).map(|at| cut(rows, at, widths[at]));
+    let cuts: Vec<usize> = cuts.collect();
     let heads = columns.iter().map(|c| Cell::Text(c.head.to_owned()));
     let heads: Vec<Cell> = heads.collect();
     let mut out = String::new();
@@ -200,10 +213,7 @@ fn broken((lead, text): (&str, &str), indent: usize, width: Option<usize>, end: 
 fn shown(text: &str) -> usize {
     let mut parts = text.split("\u{1b}[");
     let first = parts.next().unwrap_or_default().chars().count();
-    let rest = parts.map(|part| {
-        part.split_once('m')
-            .map_or(0, |(_, rest)| rest.chars().count())
-    });
+    let rest = parts.filter_map(|part| Some(part.split_once('m')?.1.chars().count()));
     first + rest.sum::<usize>()
 }
 
@@ -214,9 +224,8 @@ pub(crate) fn fitted(text: &str, width: usize) -> String {
     for line in text.lines() {
         let widest = line.char_indices().nth(width / 2);
         let half = widest.map_or("", |(at, _)| &line[..at]);
-        let indent = half
-            .rfind("  ")
-            .map_or(2, |at| half[..at + 2].chars().count());
+        let column = half.rfind("  ");
+        let indent = column.map_or(2, |at| half[..at + 2].chars().count());
         let is_command = cfg!(unix) && line.contains(": bagreel ");
         let end = if is_command { " \\" } else { "" };
         out.push_str(&broken(("", line), indent, Some(width), end));

@@ -3,6 +3,7 @@
 //! Data files (JSON, CSV, Parquet) contain plain numbers instead.
 
 use std::borrow::Cow;
+use std::fmt;
 
 use chrono::DateTime;
 
@@ -126,6 +127,11 @@ pub fn rate_of(count: u64, seconds: f64) -> String {
 
 /// `value` rounded to `digits` significant digits; unchanged if it is 0, infinite or NaN.
 pub fn significant(value: f64, digits: u8) -> f64 {
+    to_digits(value, digits, libm::round)
+}
+
+/// As [`significant`], rounded by `whole` to a whole number of units of the last digit.
+pub(crate) fn to_digits(value: f64, digits: u8, whole: impl Fn(f64) -> f64) -> f64 {
     if !value.is_finite() || value == 0.0 {
         return value;
     }
@@ -133,9 +139,9 @@ pub fn significant(value: f64, digits: u8) -> f64 {
     let scale = libm::pow(10.0, libm::fabs(power));
     // Dividing by a power of ten keeps 0.3 exact, multiplying by 0.1 would not.
     if power >= 0.0 {
-        libm::round(value * scale) / scale
+        whole(value * scale) / scale
     } else {
-        libm::round(value / scale) * scale
+        whole(value / scale) * scale
     }
 }
 
@@ -180,8 +186,7 @@ pub fn count(n: impl TryInto<usize>, word: &str) -> String {
 /// The counts that are not 0, as `write` writes each: `2 nodes, 1 topic`.
 pub(crate) fn counted(counts: &[(usize, &str)], write: impl Fn(usize, &str) -> String) -> String {
     let counts = counts.iter().filter(|(n, _)| *n > 0);
-    let counts = counts.map(|(n, word)| write(*n, word));
-    counts.collect::<Vec<_>>().join(", ")
+    joined(counts.map(|(n, word)| write(*n, word)), ", ")
 }
 
 /// A share as a whole percentage without its sign: `25` for 0.25.
@@ -311,12 +316,18 @@ pub fn shorten(text: &str, most: usize) -> Cow<'_, str> {
     Cow::Owned(kept + "…")
 }
 
+/// Texts one after the other, with `between` between them.
+pub(crate) fn joined<T: fmt::Display>(texts: impl IntoIterator<Item = T>, between: &str) -> String {
+    let texts: Vec<String> = texts.into_iter().map(|text| text.to_string()).collect();
+    texts.join(between)
+}
+
 /// A list of names, shortened: `a, b and c`, or `a, b, c and 4 more`. At least one and at most `most` are named.
-pub fn some_of<S: AsRef<str>>(names: &[S], most: usize) -> String {
+pub fn some_of<S: AsRef<str>>(names: impl IntoIterator<Item = S>, most: usize) -> String {
+    let names: Vec<S> = names.into_iter().collect();
     let listed: Vec<&str> = names.iter().take(most.max(1)).map(AsRef::as_ref).collect();
     match (listed.as_slice(), names.len() - listed.len()) {
-        ([], _) => String::new(),
-        ([one], 0) => (*one).to_owned(),
+        ([] | [_], 0) => listed.concat(),
         ([first @ .., last], 0) => format!("{} and {last}", first.join(", ")),
         (listed, rest) => format!("{} and {rest} more", listed.join(", ")),
     }
@@ -343,7 +354,7 @@ pub(crate) fn visible_json(json: &str) -> Cow<'_, str> {
 }
 
 /// The text with what `write` writes for each character of which `is` is true.
-fn replaced(
+pub(crate) fn replaced(
     text: &str,
     is: impl Fn(char) -> bool,
     write: impl Fn(char, &mut String),
@@ -449,8 +460,8 @@ mod tests {
             (date(FIRST_OF_ROS - 1).unwrap_or_default(), ""),
             (shorten("/camera/image", 8).into_owned(), "/camera…"),
             (shorten("/camera", 7).into_owned(), "/camera"),
-            (some_of(&["a", "b"], 3), "a and b"),
-            (some_of(&["a", "b", "c", "d"], 2), "a, b and 2 more"),
+            (some_of(["a", "b"], 3), "a and b"),
+            (some_of(["a", "b", "c", "d"], 2), "a, b and 2 more"),
             (
                 visible("/a\u{1b}[2J\u{202e}\nb").into_owned(),
                 "/a\\u{1b}[2J\\u{202e}\\u{a}b",

@@ -5,7 +5,6 @@ mod progress;
 use std::io::{self, IsTerminal as _, Write as _};
 use std::path::Path;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
 
 use terminal_size::{Height, Width, terminal_size_of};
 
@@ -104,8 +103,7 @@ impl Terminal {
 
     /// Prints the files written, what is in them, and the time taken, in one line, as [`Terminal::status`].
     pub(crate) fn wrote<'a>(&mut self, files: impl IntoIterator<Item = &'a Path>, what: &str) {
-        let names = files.into_iter().map(|file| file.display().to_string());
-        let names = names.collect::<Vec<_>>().join(", ");
+        let names = words::joined(files.into_iter().map(Path::display), ", ");
         let seconds = self.seconds();
         self.status(&format!("wrote {names}: {what}, in {seconds:.1} s"));
     }
@@ -168,10 +166,9 @@ impl Terminal {
             let shown = printable(&line.text(width));
             if is_coloured {
                 let colour = line.kind.map_or("1", colour);
-                let start = line.lead().len().min(shown.len());
-                let end = shown[start..]
-                    .find([':', '\n'])
-                    .map_or(shown.len(), |at| start + at);
+                let start = line.lead.len().min(shown.len());
+                let end = shown[start..].find([':', '\n']);
+                let end = end.map_or(shown.len(), |at| start + at);
                 let (lead, head, rest) = (&shown[..start], &shown[start..end], &shown[end..]);
                 text.extend([lead, "\u{1b}[", colour, "m", head, "\u{1b}[0m", rest]);
             } else {
@@ -200,15 +197,6 @@ impl Terminal {
         }
     }
 
-    /// Waits before checking a file again.
-    #[expect(
-        clippy::unused_self,
-        reason = "only code with access to the terminal may print and wait"
-    )]
-    pub(crate) fn wait(&self) {
-        std::thread::sleep(Duration::from_millis(200));
-    }
-
     /// Seconds since the command began.
     pub(crate) fn seconds(&self) -> f64 {
         self.progress.seconds()
@@ -234,17 +222,11 @@ pub(super) fn print_usage(error: &str) {
 /// Whether standard error, or standard output, has colours: only on a terminal that has them, and if `NO_COLOR` is not set,
 /// unless `--color` overrides it.
 pub(super) fn has_colour(asked: Colour, is_error: bool) -> bool {
-    let is_terminal = || {
-        if is_error {
-            io::stderr().is_terminal()
-        } else {
-            io::stdout().is_terminal()
-        }
-    };
     match asked {
         Colour::Auto => {
             let is_refused = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
-            !is_refused && !progress::is_dumb() && is_terminal()
+            let (out, error) = (io::stdout().is_terminal(), io::stderr().is_terminal());
+            !is_refused && !progress::is_dumb() && if is_error { error } else { out }
         }
         Colour::Always => true,
         Colour::Never => false,
@@ -279,20 +261,16 @@ fn colour(kind: Kind) -> &'static str {
 fn summary(notices: &[Notice]) -> String {
     let of = |kind: NoticeKind| notices.iter().filter(move |notice| notice.kind == kind);
     let hidden: u64 = of(NoticeKind::Hidden).map(|notice| notice.count).sum();
+    let [chosen, fonts] =
+        [NoticeKind::Chosen, NoticeKind::Glyph].map(|kind| of(kind).count() as u64);
     let parts = [
-        (hidden, "element", " left out or collapsed"),
-        (of(NoticeKind::Chosen).count() as u64, "setting", " chosen"),
-        (
-            of(NoticeKind::Glyph).count() as u64,
-            "font",
-            " about missing characters",
-        ),
+        (hidden, "element", "left out or collapsed"),
+        (chosen, "setting", "chosen"),
+        (fonts, "font", "about missing characters"),
     ];
     let parts = parts.iter().filter(|(count, ..)| *count > 0);
-    let parts: Vec<String> = parts
-        .map(|(count, what, how)| words::count(*count, what) + how)
-        .collect();
-    format!("{}; `-v` lists them", parts.join(", "))
+    let parts = parts.map(|(count, what, how)| format!("{} {how}", words::count(*count, what)));
+    format!("{}; `-v` lists them", words::joined(parts, ", "))
 }
 
 impl Watch for Terminal {

@@ -543,7 +543,7 @@ impl PageChanges {
                 _ => 2,
             };
             // The list is sorted by the best estimate of each time, so that it has no ranges.
-            let when = match line.lead().trim() {
+            let when = match line.lead.trim() {
                 range if range.contains('–') => {
                     format!("~{}", words::offset_seconds(mission.offset(event.time)))
                 }

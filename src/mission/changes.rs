@@ -25,37 +25,14 @@ pub struct Change {
 }
 
 impl Change {
-    fn new(kind: Kind, what: Element, time: Option<Stamp>) -> Self {
+    /// An element that only this window has, or only the one before it: its kind if it is a node, and that of others.
+    fn of([node, other]: [Kind; 2], what: Element, time: Option<Stamp>) -> Self {
         Self {
-            kind,
+            kind: if what.is_node() { node } else { other },
             what,
             time,
             detail: Detail::None,
         }
-    }
-
-    /// An element that was not in the previous window.
-    fn added(what: Element, time: Option<Stamp>) -> Self {
-        let kind = if what.is_node() {
-            Kind::Started
-        } else {
-            Kind::Appeared
-        };
-        Self::new(kind, what, time)
-    }
-
-    /// An element that was in the previous window and is not in this one.
-    fn removed(what: Element, time: Option<Stamp>) -> Self {
-        let kind = if what.is_node() {
-            Kind::Stopped
-        } else {
-            Kind::Vanished
-        };
-        Self::new(kind, what, time)
-    }
-
-    fn with(self, detail: Detail) -> Self {
-        Self { detail, ..self }
     }
 
     /// Whether the element was not in the previous window.
@@ -187,13 +164,15 @@ fn structure(
         let time = elements.seen(what).first.filter(|t| span.contains(*t));
         if let Some((at, id)) = times.find(&times.begins, what, span.end) {
             let time = time.or(Some(at).filter(|at| span.contains(*at)));
-            list.push((Change::added(what, time), id));
+            let change = Change::of([Kind::Started, Kind::Appeared], what, time);
+            list.push((change, id));
         }
     }
     for what in differ.removed.iter().copied() {
         if let Some((at, id)) = times.find(&times.ends, what, span.end) {
             let time = Some(at).filter(|at| *at < span.end);
-            list.push((Change::removed(what, time), id));
+            let change = Change::of([Kind::Stopped, Kind::Vanished], what, time);
+            list.push((change, id));
         }
     }
 }
@@ -216,9 +195,12 @@ fn change(event: &Event) -> Option<Change> {
         (Detail::None, what) => event.kind == Kind::Restarted && what.is_node(),
     };
     let back = event.until.unwrap_or(event.time);
-    let time = Some(back).filter(|_| event.kind == Kind::Restarted);
-    let change = Change::new(event.kind, event.what, time).with(event.detail.clone());
-    (is_change && !event.kind.is_remark()).then_some(change)
+    (is_change && !event.kind.is_remark()).then(|| Change {
+        kind: event.kind,
+        what: event.what,
+        time: Some(back).filter(|_| event.kind == Kind::Restarted),
+        detail: event.detail.clone(),
+    })
 }
 
 /// The default share by which a rate must change to count as changed: nodes under load vary by a tenth, and a camera that is switched

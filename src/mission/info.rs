@@ -153,7 +153,7 @@ pub struct EvidenceInfo {
 }
 
 /// A topic over the whole mission.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TopicInfo {
     /// The name.
     pub name: String,
@@ -221,11 +221,8 @@ pub fn info(mission: &Mission) -> Info {
     let rates = Rates::new(mission);
     let topics = topics(mission, &rates);
     let traffic = traffic(mission, &topics);
-    let senders = |of: &[TopicId]| {
-        of.iter()
-            .flat_map(|id| rates.of_topic(*id))
-            .collect::<Vec<_>>()
-    };
+    let senders =
+        |of: &[TopicId]| -> Vec<&Sender> { of.iter().flat_map(|id| rates.of_topic(*id)).collect() };
     let named = elements.nodes.with_ids();
     let named = named.filter(|(_, node)| !is_unnamed(node.seen.evidence));
     let nodes = named.map(|(id, node)| {
@@ -365,32 +362,25 @@ fn traffic<'a>(
 
 fn topics(mission: &Mission, rates: &Rates<'_>) -> ById<TopicId, TopicInfo> {
     let elements = &mission.elements;
-    let mut topics: ById<TopicId, TopicInfo> = elements
-        .topics
-        .iter()
-        .zip(mission.skews())
+    let all = elements.topics.iter().zip(mission.skews());
+    let mut topics: ById<TopicId, TopicInfo> = all
         .map(|(topic, skew)| TopicInfo {
             name: topic.name.to_string(),
             types: topic.types.iter().map(ToString::to_string).collect(),
-            count: 0,
-            hz: None,
-            mean_hz: None,
-            bytes: None,
-            publishers: Vec::new(),
-            subscribers: Vec::new(),
             unknown_publishers: topic.unknown_publishers,
             qos: topic.qos.as_deref().map(str::to_owned),
             skew,
             activity: vec![0; mission.graphs.len()],
+            ..TopicInfo::default()
         })
         .collect();
     for (topic, id) in topics.iter_mut().zip(elements.topics.ids()) {
         for (window, row) in mission.graphs.rows(Element::Topic(id)) {
             let count = row.count.unwrap_or(0);
             topic.count += count;
-            topic.bytes = row
-                .bytes
-                .map_or(topic.bytes, |b| Some(topic.bytes.unwrap_or(0) + b));
+            if let Some(bytes) = row.bytes {
+                *topic.bytes.get_or_insert(0) += bytes;
+            }
             topic.activity[window] = count;
         }
         let bounds = Sending::bounds(mission.sending.of_topic(id).iter());
@@ -411,14 +401,11 @@ fn topics(mission: &Mission, rates: &Rates<'_>) -> ById<TopicId, TopicInfo> {
 fn evidence(mission: &Mission) -> Vec<EvidenceInfo> {
     let elements = &mission.elements;
     let rows = Evidence::all_words().map(|source| {
-        let nodes = elements
-            .nodes
-            .iter()
-            .filter(|n| n.seen.evidence.has(source));
+        let nodes = elements.nodes.iter();
         let has = |edge: &Edge| edge.seen.evidence.has(source);
         EvidenceInfo {
             source,
-            nodes: nodes.count(),
+            nodes: nodes.filter(|n| n.seen.evidence.has(source)).count(),
             publishes: elements.publishes.iter().filter(|e| has(e)).count(),
             subscribes: listeners(mission).filter(|(_, e)| has(e)).count(),
         }

@@ -36,10 +36,8 @@ impl Mission {
         let window = |(index, (span, messages)): (usize, (&Span, u64))| Window {
             index,
             span: *span,
-            partial: false,
             messages,
-            changes: Vec::new(),
-            events: Vec::new(),
+            ..Window::default()
         };
         let mut mission = Self {
             graphs: graphs.collect(),

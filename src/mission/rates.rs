@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::Mission;
 use super::event_log::Kind;
+use crate::base::ids::grouped;
 use crate::base::name::is_unnamed;
 use crate::base::rhythm::FEWEST;
 use crate::base::time::{Span, Stamp};
@@ -87,13 +88,9 @@ impl<'a> Rates<'a> {
 
     /// The roles that send a topic with the times in which they do, in order of these.
     pub(crate) fn holders(&self, topic: TopicId) -> Vec<Holder<'a>> {
-        let mut roles: BTreeMap<&Arc<str>, Vec<&Sender>> = BTreeMap::new();
-        for sender in self.of_topic(topic) {
-            let node = sender.node.map(|id| &self.mission.elements.nodes[id]);
-            if let Some(node) = node {
-                roles.entry(&node.role).or_default().push(sender);
-            }
-        }
+        let nodes = &self.mission.elements.nodes;
+        let senders = self.of_topic(topic).into_iter();
+        let roles = grouped(senders.filter_map(|s| Some((&nodes[s.node?].role, s))));
         let holder = |(role, senders): (&'a Arc<str>, Vec<&Sender>)| {
             let times = self.of(&senders).iter().map(|piece| piece.span).collect();
             let times = Span::joined(times, 0);

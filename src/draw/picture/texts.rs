@@ -318,7 +318,7 @@ pub fn unshown(view: &View, fonts: &Fonts) -> Option<Notice> {
     let names = items.map(|item| &*item.name);
     let missing: BTreeSet<char> = names.flat_map(|name| fonts.missing(name)).collect();
     let spelled = missing.iter().map(|c| c.escape_unicode().to_string());
-    let some = words::some_of(&spelled.collect::<Vec<_>>(), 3);
+    let some = words::some_of(spelled, 3);
     let text = format!(
         "names contain characters that the font lacks, drawn as {some}; add a font with `--font FILE`"
     );

@@ -87,7 +87,7 @@ pub(crate) fn sorted(mut list: ById<EventId, Event>, elements: &Elements) -> ByI
 
 impl Event {
     /// An event at a moment, with nothing else known about it.
-    pub(in crate::mission) fn new(kind: Kind, what: Element, at: Bound) -> Self {
+    pub(crate) fn new(kind: Kind, what: Element, at: Bound) -> Self {
         Self {
             kind,
             what,

@@ -50,12 +50,8 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
         let roles: BTreeSet<&Arc<str>> = all.iter().map(|s| &s.role).collect();
         if (2..=MOST_SENDERS).contains(&roles.len()) {
             for (old, new) in replaced(&all, end) {
-                hand_over(
-                    context,
-                    drafts,
-                    topic,
-                    [(old.node, old.sent.last), (new.node, new.sent.first)],
-                );
+                let ends = [(old.node, old.sent.last), (new.node, new.sent.first)];
+                hand_over(context, drafts, topic, ends);
             }
             shares(context, drafts, topic, senders);
         }

@@ -103,8 +103,8 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EventId], event: &Event) -> 
 
 /// The names of nodes in one text.
 pub(super) fn node_names(elements: &Elements, nodes: &[NodeId], between: &str) -> String {
-    let name = |id: &NodeId| visible(elements.nodes[*id].name.as_str()).into_owned();
-    nodes.iter().map(name).collect::<Vec<_>>().join(between)
+    let name = |id: &NodeId| visible(elements.nodes[*id].name.as_str());
+    words::joined(nodes.iter().map(name), between)
 }
 
 /// The publishers of a topic, if none of `ends` is one.
@@ -134,7 +134,7 @@ fn too(mission: &Mission, parts: &[EventId], event: &Event) -> String {
     let elements = &mission.elements;
     let own = elements.ends(event.what);
     let is_node = event.what.is_node();
-    let (mut alike, mut silent) = (Vec::new(), Vec::new());
+    let (mut alike, mut silent) = (BTreeSet::new(), BTreeSet::new());
     for part in parts.iter().filter_map(|id| mission.log.events.get(*id)) {
         let (node, topic) = elements.ends(part.what);
         // The topics of a node that stopped or is silent are implied.
@@ -152,16 +152,14 @@ fn too(mission: &Mission, parts: &[EventId], event: &Event) -> String {
             None => name(elements, part),
         };
         match part.kind {
-            kind if kind == event.kind && kind != Kind::Restarted => alike.push(name),
-            Kind::Silent => silent.push(name),
-            _ => {}
-        }
+            kind if kind == event.kind && kind != Kind::Restarted => alike.insert(name),
+            Kind::Silent => silent.insert(name),
+            _ => false,
+        };
     }
-    let listed = |lead: &str, mut names: Vec<String>| {
-        names.sort_unstable();
-        names.dedup();
-        let names = (!names.is_empty()).then(|| words::some_of(&names, NAMED));
-        names.map_or_else(String::new, |names| format!("; {lead} {names}"))
+    let listed = |lead: &str, names: BTreeSet<String>| match words::some_of(names, NAMED) {
+        none if none.is_empty() => none,
+        some => format!("; {lead} {some}"),
     };
     listed("also", alike) + &listed("silent since then:", silent)
 }
@@ -171,10 +169,11 @@ fn too(mission: &Mission, parts: &[EventId], event: &Event) -> String {
 fn together(mission: &Mission, parts: &[EventId], event: &Event) -> String {
     let parts = parts.iter().filter_map(|id| mission.log.events.get(*id));
     let silent = parts.chain([event]).filter(|e| e.kind == Kind::Silent);
-    let silent: BTreeSet<NodeId> = silent
-        .filter(|e| e.what.is_node())
-        .filter_map(|e| mission.elements.ends(e.what).0)
-        .collect();
+    let silent = silent.filter_map(|e| match e.what {
+        Element::Node(id) => Some(id),
+        _ => None,
+    });
+    let silent: BTreeSet<NodeId> = silent.collect();
     let is_there = |node: &NodeId| {
         let mut lives = mission.elements.nodes[*node].seen.lives.iter();
         lives.any(|life| life.contains(event.time))
@@ -252,13 +251,11 @@ fn with(mission: &Mission, parts: &[EventId], event: &Event) -> String {
     let space = node.map_or("", |id| namespace(elements.nodes[id].name.as_str()));
     let phrases = [("publishes", sends), ("subscribes to", takes)].map(|(verb, topics)| {
         let names = short_topics(elements, &topics, space);
-        (!names.is_empty()).then(|| format!("{verb} {}", words::some_of(&names, NAMED)))
+        (!names.is_empty()).then(|| format!("{verb} {}", words::some_of(names, NAMED)))
     });
-    let phrases: Vec<String> = phrases.into_iter().flatten().collect();
-    if phrases.is_empty() {
-        String::new()
-    } else {
-        format!(": {}", phrases.join("; "))
+    match words::joined(phrases.into_iter().flatten(), "; ") {
+        nothing if nothing.is_empty() => nothing,
+        phrases => format!(": {phrases}"),
     }
 }
 

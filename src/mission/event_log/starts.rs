@@ -60,13 +60,7 @@ fn is_by_chance(context: &LogInput<'_>, topic: TopicId, kind: Kind, time: Stamp)
     };
     let span = Span::new(run[0].first, run[run.len() - 1].last);
     let usual = run.iter().map(|s| s.period).max().unwrap_or(0);
-    let pauses = context
-        .history
-        .sending
-        .pauses
-        .get(topic)
-        .into_iter()
-        .flatten();
+    let pauses = context.history.sending.pauses.of(topic).iter();
     let mut inside = pauses.filter(|pause| span.start <= pause.start && pause.end <= span.end);
     let count: u64 = run.iter().map(|s| s.count).sum();
     count < STEADY || span.nanos() < STEADY_NS || inside.any(|pause| pause.nanos() > usual / 2 * 5)
@@ -108,18 +102,17 @@ fn limits_by_role<'a>(context: &LogInput<'a>) -> BTreeMap<&'a str, Vec<NodeLimit
         for life in context.lives(Element::Node(node)) {
             let ends = life.began.zip(life.ended);
             let is_moment = ends.is_some_and(|(b, e)| b.time == e.time);
-            own.extend(
-                limits(std::slice::from_ref(life)).map(|(kind, at)| NodeLimit {
-                    node,
-                    kind,
-                    at,
-                    rank: match kind {
-                        _ if is_moment => 1,
-                        Kind::Started => 2,
-                        _ => 0,
-                    },
-                }),
-            );
+            let limits = limits(std::slice::from_ref(life));
+            own.extend(limits.map(|(kind, at)| NodeLimit {
+                node,
+                kind,
+                at,
+                rank: match kind {
+                    _ if is_moment => 1,
+                    Kind::Started => 2,
+                    _ => 0,
+                },
+            }));
         }
     }
     for limits in all.values_mut() {

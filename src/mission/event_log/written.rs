@@ -1,6 +1,5 @@
 //! The event log as lines for people or rows for programs, independent of windows.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use serde::Serialize;
@@ -132,11 +131,7 @@ fn with_switches<'a>(mission: &Mission, rows: Vec<LogRow<'a>>) -> Vec<LogRow<'a>
 
 fn chosen(mission: &Mission, options: LogOptions) -> Vec<LogRow<'_>> {
     let log = &mission.log;
-    let parts = if options.parts {
-        log.all_parts()
-    } else {
-        BTreeMap::new()
-    };
+    let parts = log.all_parts();
     let phases = log.phases.iter().enumerate();
     let mut phases = phases.filter(|_| options.phases).peekable();
     let mut interruptions = log.interruptions.iter().peekable();
@@ -152,7 +147,8 @@ fn chosen(mission: &Mission, options: LogOptions) -> Vec<LogRow<'_>> {
             continue;
         }
         rows.push(LogRow::Event(id, event));
-        let own = parts.get(&id).into_iter().flatten();
+        let own = parts.get(&id).filter(|_| options.parts);
+        let own = own.into_iter().flatten();
         let own = own.filter_map(|part| Some(LogRow::Part(*part, log.events.get(*part)?)));
         rows.extend(own);
     }
@@ -188,7 +184,8 @@ fn title(at: usize, phase: &Phase) -> String {
 pub struct LogLine {
     /// The kind of event; `None` for the title of a phase, for what the recorder did, and for an object.
     pub(crate) kind: Option<Kind>,
-    lead: String,
+    /// The time with the space after it.
+    pub(crate) lead: String,
     pub(crate) words: String,
 }
 
@@ -199,11 +196,6 @@ impl LogLine {
             words: words.to_owned(),
             ..Self::default()
         }
-    }
-
-    /// The time with the space after it.
-    pub(crate) fn lead(&self) -> &str {
-        &self.lead
     }
 
     /// The line, broken to `width` characters with a hanging indent; ends in a new line.
@@ -293,17 +285,8 @@ fn markdown(mission: &Mission, rows: &[LogRow<'_>]) -> String {
 
 /// A text escaped so that Markdown shows it as it is.
 fn escaped(text: &str) -> String {
-    let mut all = String::with_capacity(text.len());
-    for c in text.chars() {
-        if matches!(
-            c,
-            '\\' | '|' | '`' | '*' | '_' | '[' | ']' | '<' | '>' | '~' | '&' | '@' | '#'
-        ) {
-            all.push('\\');
-        }
-        all.push(c);
-    }
-    all
+    let is_sign = |c| r"\|`*_[]<>~&@#".contains(c);
+    words::replaced(text, is_sign, |c, out| out.extend(['\\', c])).into_owned()
 }
 
 const COLUMNS: &str = "\

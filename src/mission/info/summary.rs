@@ -64,7 +64,7 @@ pub(crate) fn summary(mission: &Mission, info: &Info) -> String {
         let at = words::offset_seconds(mission.offset(at));
         words::shorten(&format!("{at} {words}"), LONGEST).into_owned()
     });
-    let moments: Vec<String> = moments.collect();
+    let moments = words::joined(moments, "; ");
     let counts = [
         (all.len(), "change"),
         (log.interruptions.len(), "interruption"),
@@ -78,7 +78,7 @@ pub(crate) fn summary(mission: &Mission, info: &Info) -> String {
     if moments.is_empty() {
         return first;
     }
-    format!("{first}. {}", moments.join("; "))
+    format!("{first}. {moments}")
 }
 
 /// The topics whose first or last message shows no change, such as the last key that somebody presses: `/cmd_vel at times, `.
@@ -142,7 +142,7 @@ pub(crate) fn described(mission: &Mission, headlines: &[Headline<'_>], most: Mos
         let names = names(mission, own, most.elements);
         format!("{names} {}", mission.log.word(*kind))
     });
-    words.collect::<Vec<String>>().join(", ")
+    words::joined(words, ", ")
 }
 
 /// The names of some elements, of nodes their roles, without the namespace that all of them share.
@@ -159,16 +159,15 @@ fn names(mission: &Mission, headlines: &[Headline<'_>], most: usize) -> String {
     if space == "/" || names.len() == 1 || names.iter().any(|name| namespace(name) != space) {
         return words::some_of(&names, most);
     }
-    let short: Vec<&str> = names.iter().map(|name| last_part(name)).collect();
-    format!("{} of {space}", words::some_of(&short, most))
+    let short = names.iter().map(|name| last_part(name));
+    format!("{} of {space}", words::some_of(short, most))
 }
 
 /// The log's sentences about the first of these, and the number of the others.
 fn of_the_log(mission: &Mission, headlines: &[Headline<'_>], most: usize) -> String {
     // Two kinds in a moment leave space for one sentence each.
     let most = most - usize::from(most == MOMENT.elements);
-    let said = headlines
-        .iter()
-        .map(|(_, event)| sentence_with(mission, &[], event));
-    words::some_of(&said.collect::<Vec<String>>(), most)
+    let said = headlines.iter();
+    let said = said.map(|(_, event)| sentence_with(mission, &[], event));
+    words::some_of(said, most)
 }

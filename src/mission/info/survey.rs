@@ -100,18 +100,12 @@ fn unknown_publishers(info: &Info) -> TableCell<'_> {
 }
 
 fn evidence(info: &Info) -> String {
-    let words: Vec<&str> = info.evidence.iter().map(|e| e.source).collect();
-    words.join(" ")
+    words::joined(info.evidence.iter().map(|e| e.source), " ")
 }
 
 /// The survey as a table for people, fitted to `width`; the line of an unreadable bag has the reason.
 pub fn survey_text(rows: &[SurveyRow], width: Option<usize>) -> String {
-    let column = |head, is_right, least, goes| Column {
-        head,
-        is_right,
-        least,
-        gives: (goes, goes),
-    };
+    let column = |head, is_right, least, goes| Column::new(head, is_right, least, (goes, goes));
     let columns = [
         column("bag", false, width.unwrap_or(0).clamp(60, 144) / 3, 0),
         column("format", false, WHOLE, 4),
@@ -130,10 +124,7 @@ pub fn survey_text(rows: &[SurveyRow], width: Option<usize>) -> String {
         column("evidence", false, 12, 1),
     ];
     let read: Vec<Vec<Cell>> = rows.iter().filter_map(|row| text_row(row, width)).collect();
-    let mut out = String::new();
-    if !read.is_empty() {
-        out = table(&columns, &read, width);
-    }
+    let mut out = table(&columns, &read, width);
     for row in rows {
         if let Some(error) = &row.error {
             let lead = format!("  {}  ", visible(&row.path));
@@ -152,15 +143,12 @@ fn text_row(row: &SurveyRow, width: Option<usize>) -> Option<Vec<Cell>> {
     };
     let info = row.info.as_ref().filter(|_| row.error.is_none())?;
     let bag = info.bags.first();
+    let start = Stamp(info.start_ns).to_string();
     let cells = [
         visible(&row.path).into_owned(),
         bag.map(|b| b.format.clone()).unwrap_or_default(),
         row.file_bytes.map(words::bytes).unwrap_or_default(),
-        Stamp(info.start_ns)
-            .to_string()
-            .chars()
-            .take(date.len())
-            .collect(),
+        start.chars().take(date.len()).collect(),
         words::offset_seconds(info.end_ns.saturating_sub(info.start_ns)),
         info.messages.to_string(),
         info.topics.len().to_string(),

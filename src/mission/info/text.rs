@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{ConfidenceCounts, Info, NodeInfo, TopicInfo};
+use super::{ConfidenceCounts, FigureInfo, Info, NodeInfo, TopicInfo};
 use crate::bag::Tier;
 use crate::base::columns::{Cell, Column, WHOLE, hang, table};
 use crate::base::time::Stamp;
@@ -48,15 +48,11 @@ fn undrawn(out: &mut String, info: &Info) -> std::fmt::Result {
 fn head(out: &mut String, info: &Info) -> std::fmt::Result {
     writeln!(out, "{}\n", info.summary)?;
     for bag in &info.bags {
-        let how = bag
-            .tier_reason
-            .as_ref()
-            .map_or_else(String::new, |why| format!(" ({})", visible(why)));
+        let how = bag.tier_reason.as_ref();
+        let how = how.map_or_else(String::new, |why| format!(" ({})", visible(why)));
         let state = if bag.complete { "" } else { ", damaged" };
         let compression = bag.compression.iter().filter(|word| *word != "none");
-        let compression: Vec<&str> = compression.map(String::as_str).collect();
-        let compression = compression.join("+");
-        let compression = format!(" {}", visible(&compression));
+        let compression = format!(" {}", visible(&words::joined(compression, "+")));
         let compression = compression.trim_end();
         writeln!(
             out,
@@ -80,10 +76,7 @@ fn head(out: &mut String, info: &Info) -> std::fmt::Result {
         out,
         "{} long, {}\n",
         words::offset((info.end_ns - 1).saturating_sub(info.start_ns) / 1_000_000 * 1_000_000),
-        words::count(
-            usize::try_from(info.messages).unwrap_or(usize::MAX),
-            "message"
-        )
+        words::count(info.messages, "message")
     )
 }
 
@@ -96,12 +89,8 @@ fn known(out: &mut String, info: &Info) -> std::fmt::Result {
         how_many("subscription", info.subscribes_by_degree)
     )?;
     let with = info.topics.iter().filter(|t| t.count > 0).count();
-    let unknown: u32 = info
-        .topics
-        .iter()
-        .filter_map(|t| t.unknown_publishers)
-        .sum();
-    let counted = match unknown as usize {
+    let unknown = info.topics.iter().filter_map(|t| t.unknown_publishers);
+    let counted = match unknown.sum::<u32>() {
         0 => String::new(),
         n => format!(" ({})", words::count(n, "unnamed publisher")),
     };
@@ -121,14 +110,13 @@ fn known(out: &mut String, info: &Info) -> std::fmt::Result {
         let parts = words::counted(&parts, words::count);
         writeln!(out, "  {:<18} {parts}", row.source)?;
     }
-    info.advice
-        .iter()
-        .try_for_each(|line| writeln!(out, "to learn more: {line}"))?;
-    for figure in &info.figures {
-        let (word, shows) = (figure.figure, &figure.shows);
+    for line in &info.advice {
+        writeln!(out, "to learn more: {line}")?;
+    }
+    for FigureInfo { figure, shows } in &info.figures {
         writeln!(
             out,
-            "for a paper: `bagreel figure --kind {word}` shows {shows}"
+            "for a paper: `bagreel figure --kind {figure}` shows {shows}"
         )?;
     }
     writeln!(out)
@@ -151,44 +139,32 @@ pub(crate) fn how_many(what: &str, confidences: ConfidenceCounts) -> String {
     }
 }
 
-const fn column(head: &'static str, is_right: bool, least: usize, gives: (u8, u8)) -> Column {
-    Column {
-        head,
-        is_right,
-        least,
-        gives,
-    }
-}
-
 const TOPIC_COLUMNS: [Column; 6] = [
-    column("topic", false, 28, (0, 0)),
-    column("type", false, 12, (2, 1)),
-    column("messages", true, WHOLE, (0, 0)),
-    column("while sending", true, WHOLE, (0, 0)),
-    column("skew", true, WHOLE, (0, 3)),
-    column("activity", false, 8, (1, 2)),
+    Column::new("topic", false, 28, (0, 0)),
+    Column::new("type", false, 12, (2, 1)),
+    Column::new("messages", true, WHOLE, (0, 0)),
+    Column::new("while sending", true, WHOLE, (0, 0)),
+    Column::new("skew", true, WHOLE, (0, 3)),
+    Column::new("activity", false, 8, (1, 2)),
 ];
 
 const NODE_COLUMNS: [Column; 5] = [
-    column("node", false, 24, (0, 0)),
-    column("known", false, WHOLE, (0, 1)),
-    column("alive", true, WHOLE, (0, 0)),
-    column("sends", false, WHOLE, (0, 3)),
-    column("receives", false, WHOLE, (0, 2)),
+    Column::new("node", false, 24, (0, 0)),
+    Column::new("known", false, WHOLE, (0, 1)),
+    Column::new("alive", true, WHOLE, (0, 0)),
+    Column::new("sends", false, WHOLE, (0, 3)),
+    Column::new("receives", false, WHOLE, (0, 2)),
 ];
 
 fn topics(topics: &[TopicInfo], width: Option<usize>) -> String {
     let row = |topic: &TopicInfo| {
+        let skew = topic.skew.map(|skew| format!("{skew:.2}"));
         vec![
             Cell::Text(visible(topic.name.as_str()).into_owned()),
             Cell::Type(visible(&topic.types.join(" ")).into_owned()),
             Cell::Text(topic.count.to_string()),
             Cell::Text(topic.hz.map_or_else(String::new, words::rate)),
-            Cell::Text(
-                topic
-                    .skew
-                    .map_or_else(String::new, |skew| format!("{skew:.2}")),
-            ),
+            Cell::Text(skew.unwrap_or_default()),
             Cell::Bars(topic.activity.clone()),
         ]
     };
@@ -217,9 +193,8 @@ fn alive(node: &NodeInfo, start_ns: i64) -> String {
     match (node.first_ns, node.last_ns) {
         (Some(first), Some(last)) if at(first) == at(last) => format!("at {}", at(first)),
         (Some(first), Some(last)) => format!("{} – {}", at(first), at(last)),
-        (first, last) => first
-            .or(last)
-            .map_or_else(|| "?".to_owned(), |one| format!("at {}", at(one))),
+        (Some(one), None) | (None, Some(one)) => format!("at {}", at(one)),
+        (None, None) => "?".to_owned(),
     }
 }
 

@@ -109,7 +109,7 @@ fn describe(
 ) -> std::fmt::Result {
     let seen = mission.elements.seen(element);
     let at = |time: Stamp| words::offset(mission.offset(time));
-    let words: Vec<&str> = seen.evidence.words().collect();
+    let words = words::joined(seen.evidence.words(), ", ");
     let signs = match seen.first.zip(seen.last) {
         None => "no times of its own".to_owned(),
         Some((first, last)) => format!("first sign {}, last sign {}", at(first), at(last)),
@@ -118,7 +118,7 @@ fn describe(
     for line in answer(mission, element, pieces) {
         writeln!(out, "  {}", visible(&line))?;
     }
-    writeln!(out, "  evidence: {}; {signs}", words.join(", "))
+    writeln!(out, "  evidence: {words}; {signs}")
 }
 
 /// The most names in a line of the answer, the most times of each, and the most log records before an end.
@@ -143,8 +143,8 @@ fn answer(mission: &Mission, element: Element, pieces: &[EvidenceLine]) -> Vec<S
         });
         let mut named: Vec<_> = named.collect();
         named.sort();
-        let named: Vec<String> = named.into_iter().map(|(_, text)| text).collect();
-        (!named.is_empty()).then(|| words::some_of(&named, NAMES))
+        let named = named.into_iter().map(|(_, text)| text);
+        Some(words::some_of(named, NAMES)).filter(|named| !named.is_empty())
     };
     let mut lines = match element {
         Element::Topic(id) => {
@@ -153,13 +153,15 @@ fn answer(mission: &Mission, element: Element, pieces: &[EvidenceLine]) -> Vec<S
             let unnamed = all.topics[id].unknown_publishers.filter(|n| *n > 0);
             let unnamed = unnamed.map(|n| words::count(n as usize, "unnamed node"));
             let senders = [peers(true, &of, &node), unnamed].into_iter().flatten();
-            let senders: Vec<String> = senders.collect();
-            let senders = (!senders.is_empty()).then(|| senders.join(", and by "));
-            let receivers = peers(false, &of, &node);
-            let or = |known: Option<String>| known.unwrap_or_else(|| "no known node".to_owned());
+            let senders = words::joined(senders, ", and by ");
+            let receivers = peers(false, &of, &node).unwrap_or_default();
+            let [senders, receivers] = [senders, receivers].map(|known| match known {
+                nobody if nobody.is_empty() => "no known node".to_owned(),
+                known => known,
+            });
             vec![
-                format!("published by {}", or(senders)),
-                format!("received by {}", or(receivers)),
+                format!("published by {senders}"),
+                format!("received by {receivers}"),
             ]
         }
         Element::Node(id) => {
@@ -225,7 +227,7 @@ fn when(mission: &Mission, what: Element) -> String {
             (from, to) => format!("{}–{}", from.unwrap_or_default(), to.unwrap_or_default()),
         }
     });
-    words::some_of(&lives.collect::<Vec<String>>(), TIMES)
+    words::some_of(lives, TIMES)
 }
 
 /// The last warnings and errors that a node logged before an end; if it logs, and none of them, a line that says so.
@@ -236,12 +238,10 @@ fn logged(mission: &Mission, role: &str, end: Stamp, pieces: &[EvidenceLine]) ->
         let is_child = |part: &str| part.starts_with('/');
         let is_own = is_named(logger, role) || logger.strip_prefix(role).is_some_and(is_child);
         logs |= is_own;
-        let time = piece
-            .time
-            .filter(|time| (-LOGGED_NS.0..=LOGGED_NS.1).contains(&time.since(end)))?;
-        let is_warning = ["WARN:", "ERROR:", "FATAL:"]
-            .iter()
-            .any(|word| text.starts_with(word));
+        let is_near = |time: &Stamp| (-LOGGED_NS.0..=LOGGED_NS.1).contains(&time.since(end));
+        let time = piece.time.filter(is_near)?;
+        let mut warnings = ["WARN:", "ERROR:", "FATAL:"].iter();
+        let is_warning = warnings.any(|word| text.starts_with(word));
         let at = words::offset_tenths(mission.offset(time));
         (is_own && is_warning).then(|| format!("{at:>13}    {text}"))
     });
@@ -260,10 +260,8 @@ fn unknown(mission: &Mission, names: &[String]) -> Error {
     let all = &mission.elements;
     let nodes = || all.nodes.iter().flat_map(|n| [n.name.as_str(), &*n.role]);
     let known = || nodes().chain(all.topics.iter().map(|t| t.name.as_str()));
-    let Some(name) = names
-        .iter()
-        .find(|name| known().all(|known| known != *name))
-    else {
+    let is_unknown = |name: &&String| known().all(|known| known != *name);
+    let Some(name) = names.iter().find(is_unknown) else {
         let what = format!("nothing connects `{}`", names.join("` and `"));
         return Error::usage(what, "`--why NAME` explains one of them");
     };
@@ -279,11 +277,9 @@ fn similar<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
     let last = last_part(name).to_lowercase();
     let close = known.filter(|known| !last.is_empty() && known.to_lowercase().contains(&last));
     let close: BTreeSet<&str> = close.collect();
-    let close: Vec<&str> = close.into_iter().take(OFFERED).collect();
-    if close.is_empty() {
-        "`bagreel info` lists every name".to_owned()
-    } else {
-        format!("similar names: {}", close.join(", "))
+    match words::joined(close.into_iter().take(OFFERED), ", ") {
+        none if none.is_empty() => "`bagreel info` lists every name".to_owned(),
+        some => format!("similar names: {some}"),
     }
 }
 

@@ -91,8 +91,7 @@ fn mission_of(mut raw: Raw) -> Result<Mission, String> {
         span: *span,
         partial: window.partial.unwrap_or(span.nanos() < period.nanos()),
         messages: window.messages.unwrap_or(0),
-        changes: Vec::new(),
-        events: Vec::new(),
+        ..Window::default()
     });
     let windows: Vec<Window> = windows.collect();
     let messages = windows.iter().map(|w| w.messages);

@@ -69,8 +69,10 @@ impl Serialize for Json<'_> {
             let all = mission.log.interruptions.iter();
             map.serialize_entry("interruptions", &List(all.map(InterruptionRow::from)))?;
         }
-        let phases = mission.log.phases.iter().map(PhaseRow::from);
-        map.serialize_entry("phases", &List(phases))?;
+        map.serialize_entry(
+            "phases",
+            &List(mission.log.phases.iter().map(PhaseRow::from)),
+        )?;
         map.serialize_entry("elements", &List(elements(mission)))?;
         let window = |window| WindowOf { window, mission };
         map.serialize_entry("windows", &List(mission.windows.iter().map(window)))?;

@@ -59,8 +59,7 @@ impl<'a> PhaseNames<'a> {
     }
 
     fn listed(&self, names: &[&Arc<str>]) -> String {
-        let names: Vec<&str> = names.iter().map(|name| self.short.of(name)).collect();
-        some_of(&names, MOST)
+        some_of(names.iter().map(|name| self.short.of(name)), MOST)
     }
 }
 
