@@ -16,7 +16,7 @@ mod judge;
 mod report;
 mod values;
 
-pub(crate) use baseline::{Runs, update, write};
+pub(crate) use baseline::{update, write};
 pub use difference::{DiffSubject, Difference, Where};
 pub(crate) use difference::{Side, differences, pairs, union};
 pub(crate) use expectation::{Expectation, read};

@@ -16,7 +16,7 @@ use crate::graph::history::Bound;
 use crate::mission::Mission;
 use crate::mission::event_log::Kind;
 
-pub(crate) use update::{Runs, update};
+pub(crate) use update::update;
 
 /// The longest name in the file, in bytes; longer ones are left out: YAML allows no longer keys, and ROS allows 255.
 const LONGEST: usize = 1000;
@@ -41,14 +41,18 @@ const ENDED_NS: i64 = CLOSING_NS / 2;
 /// The time range for a first message at any time.
 const ANY_TIME: &str = "0..";
 
-/// A generated expectation.
+/// A generated or updated expectation.
 #[derive(Debug, Default)]
 pub(crate) struct Written {
+    /// The whole file.
     pub(crate) text: String,
-    /// The numbers of nodes and topics written, and of both that did not fit.
+    /// The numbers of nodes and topics written, and of both that did not fit, of a generated one.
     pub(crate) nodes: usize,
     pub(crate) topics: usize,
     pub(crate) left_out: usize,
+    /// The number of rewritten facts of an updated one, and of findings that only the author of a rule can resolve.
+    pub(crate) changed: usize,
+    pub(crate) left: usize,
 }
 
 /// The expectation that all of these runs meet, which were read with one period; without times if each `is_part` of a
@@ -87,6 +91,7 @@ fn written(draft: &Draft, from: &str, period: Period) -> Written {
         nodes: entries(&nodes),
         topics: entries(&topics),
         left_out: room.left_out,
+        ..Written::default()
     }
 }
 
@@ -172,10 +177,8 @@ impl Line {
     /// The text after the name: its facts as a mapping of YAML.
     fn text(&self) -> String {
         let pairs = self.facts.iter();
-        let pairs: Vec<String> = pairs
-            .map(|(key, value)| format!("{key}: {value}"))
-            .collect();
-        format!("{{{}}}", pairs.join(", "))
+        let pairs = pairs.map(|(key, value)| format!("{key}: {value}"));
+        format!("{{{}}}", words::joined(pairs, ", "))
     }
 }
 
@@ -189,24 +192,28 @@ impl Draft {
     fn of(runs: &[Mission], is_part: bool) -> Self {
         let runs: Vec<Facts<'_>> = runs.iter().map(Facts::new).collect();
         let times = Times::of(&runs, is_part);
+        let nodes = runs.iter().flat_map(Facts::robot_roles);
+        let topics = runs.iter().flat_map(Facts::robot_topics);
         Self {
-            nodes: nodes(&runs, &times),
-            topics: topics(&runs, &times),
+            nodes: lines(nodes.map(|one| (one.name, one)), |seen| node(seen, &times)),
+            topics: lines(topics.map(|one| (one.name(), one)), |seen| {
+                topic(seen, &times)
+            }),
         }
     }
 }
 
-fn nodes(runs: &[Facts<'_>], times: &Times) -> BTreeMap<String, Line> {
-    let roles = runs.iter().flat_map(Facts::robot_roles);
-    let all = grouped(roles.map(|role| (role.name, role)));
-    let line = |(name, seen): (&str, Vec<Role<'_>>)| {
-        let is_optional = seen.len() < runs.len();
-        (name.to_owned(), node(&seen, times, is_optional))
-    };
-    all.into_iter().map(line).collect()
+/// The line of each name by all that was seen of it.
+fn lines<'a, S>(
+    seen: impl Iterator<Item = (&'a str, S)>,
+    line: impl Fn(&[S]) -> Line,
+) -> BTreeMap<String, Line> {
+    let all = grouped(seen).into_iter();
+    all.map(|(name, seen)| (name.to_owned(), line(&seen)))
+        .collect()
 }
 
-fn node(seen: &[Role<'_>], times: &Times, is_optional: bool) -> Line {
+fn node(seen: &[Role<'_>], times: &Times) -> Line {
     let since = |run: &Role<'_>, at| run.facts.mission.offset(at);
     // Known to within seconds.
     let is_sure = |bound: &Bound| bound.latest.since(bound.earliest) <= CLOSING_NS;
@@ -222,20 +229,16 @@ fn node(seen: &[Role<'_>], times: &Times, is_optional: bool) -> Line {
     });
     let began: Option<Vec<i64>> = began.collect();
     let state = |s: &Role<'_>| s.facts.lifecycle(s.nodes).map(str::to_owned);
-    let restarts = seen
-        .iter()
-        .map(|s| s.facts.events(s.nodes, Kind::Restarted).len());
+    let restarted = |s: &Role<'_>| s.facts.events(s.nodes, Kind::Restarted).len();
+    let restarts = seen.iter().map(restarted).max().unwrap_or(0);
     let is_logged = seen.iter().all(|s| s.facts.is_logged_only(s.nodes));
     Line::of([
         ("lifecycle", common(seen, state).map(|state| scalar(&state))),
         ("within", began.and_then(|began| times.within(&began))),
         ("may_end", times.may_end(&ends, are_ends_sure)),
         ("known_by", flag(is_logged, "log")),
-        ("optional", flag(is_optional, "true")),
-        (
-            "restarts",
-            Some(format!("..{}", restarts.max().unwrap_or(0))),
-        ),
+        ("optional", flag(seen.len() < times.runs, "true")),
+        ("restarts", Some(format!("..{restarts}"))),
     ])
 }
 
@@ -266,24 +269,25 @@ impl Times {
     }
 
     /// These times with headroom on both sides: a tenth of the time, as runs vary; at least 5 s, less in a short
-    /// mission; and the difference between runs, which a single run does not show.
-    fn wide(&self, times: &[i64]) -> Option<WideTimes> {
+    /// mission; and the difference between runs, which a single run does not show. The start is in whole seconds unless it is
+    /// open, the end in nanoseconds.
+    fn wide(&self, times: &[i64]) -> Option<(Option<String>, i64)> {
         let (first, last) = (*times.iter().min()?, *times.iter().max()?);
         let usual = (self.shortest / 10).clamp(SECOND, CLOSING_NS);
         let room = usual.max(last / 10).max(last - first);
         let room = if self.runs > 1 { room } else { 2 * room };
         let from = (first - room) / SECOND * SECOND;
-        Some(WideTimes {
-            from: (from > 0).then(|| length(from)),
-            to: last + room,
-        })
+        Some(((from > 0).then(|| length(from)), last + room))
     }
 
     /// The time range for the start of an element that started at these times.
     fn within(&self, times: &[i64]) -> Option<String> {
-        let times = self.wide(times).filter(|_| !self.is_part)?;
-        let from = times.from.unwrap_or_default();
-        Some(format!("{from}..{}", length(whole(times.to))))
+        let (from, to) = self.wide(times).filter(|_| !self.is_part)?;
+        Some(format!(
+            "{}..{}",
+            from.unwrap_or_default(),
+            length(whole(to))
+        ))
     }
 
     /// The time range for the end of an element that was silent for at most `tail` nanoseconds at the end.
@@ -296,41 +300,20 @@ impl Times {
 
     /// The time range for the end of an element that ended at these times; `None` if it never did.
     fn may_end(&self, times: &[i64], is_sure: bool) -> Option<String> {
-        let from = self.wide(times)?.from;
+        let (from, _) = self.wide(times)?;
         let from = from.filter(|_| is_sure && !self.is_part);
         Some(from.map_or_else(|| "true".to_owned(), |from| format!("{from}..")))
     }
 }
 
-/// A time range of runs: its start in whole seconds unless it is open, and its end in nanoseconds.
-struct WideTimes {
-    from: Option<String>,
-    to: i64,
-}
-
-fn topics(runs: &[Facts<'_>], times: &Times) -> BTreeMap<String, Line> {
-    let of = |facts| move |id| (Facts::topic(facts, id), TopicIn { facts, id });
-    let all = grouped(runs.iter().flat_map(|run| run.robot_topics().map(of(run))));
-    let line = |(name, seen): (&str, Vec<TopicIn<'_>>)| {
-        let is_optional = seen.len() < runs.len();
-        (name.to_owned(), topic(&seen, times, is_optional))
-    };
-    all.into_iter().map(line).collect()
-}
-
-fn topic(seen: &[TopicIn<'_>], times: &Times, is_optional: bool) -> Line {
+fn topic(seen: &[TopicIn<'_>], times: &Times) -> Line {
     let since = |s: &TopicIn<'_>, at| s.facts.mission.offset(at);
-    let received = || {
-        seen.iter()
-            .filter_map(|s| Some((s, s.facts.received(s.id)?)))
-    };
-    let ends: Vec<i64> = received()
-        .filter(|(s, _)| s.ends(ENDED_NS))
-        .map(|(s, received)| since(s, received.end))
-        .collect();
-    let began: Vec<i64> = received()
-        .map(|(s, received)| since(s, received.start))
-        .collect();
+    let received = seen.iter();
+    let received = received.filter_map(|s| Some((s, s.facts.received(s.id)?)));
+    let ends = received.clone().filter(|(s, _)| s.ends(ENDED_NS));
+    let ends: Vec<i64> = ends.map(|(s, own)| since(s, own.end)).collect();
+    let began = received.clone().map(|(s, own)| since(s, own.start));
+    let began: Vec<i64> = began.collect();
     let ends_somewhere = !ends.is_empty();
     let mut to = seen.first().map(TopicIn::to).unwrap_or_default();
     for other in seen.iter().skip(1) {
@@ -352,12 +335,11 @@ fn topic(seen: &[TopicIn<'_>], times: &Times, is_optional: bool) -> Line {
     let is_many = |s: &TopicIn<'_>| s.facts.messages(s.id) >= FEWEST_OF_MEAN;
     let is_timed = hz.is_some() || !is_latched && seen.iter().all(is_many);
     // An even topic stays; for others, the last message shows whether they do.
-    let tails = received().map(|(s, received)| s.facts.mission.span.end.since(received.end));
-    let stays = times
-        .stays(tails.max().unwrap_or(0))
-        .filter(|_| hz.is_none());
+    let tails = received.map(|(s, own)| s.facts.mission.span.end.since(own.end));
+    let stays = times.stays(tails.max().unwrap_or(0));
+    let stays = stays.filter(|_| hz.is_none());
     let mean_hz = mean(seen, hz).filter(|_| is_timed);
-    let names = |names: BTreeSet<String>| (!names.is_empty()).then(|| list(names.iter()));
+    let names = |names: BTreeSet<String>| (!names.is_empty()).then(|| list(&names));
     let nodes =
         |nodes: BTreeSet<String>| names(nodes.iter().map(|name| Pattern::text_of(name)).collect());
     let types = common(seen, |s| Some(s.types())).unwrap_or_default();
@@ -367,9 +349,8 @@ fn topic(seen: &[TopicIn<'_>], times: &Times, is_optional: bool) -> Line {
     };
     let within = times.within(&began);
     let may_end = times.may_end(&ends, true).or(stays);
-    let max_gap = longest(seen, ends_somewhere)
-        .map(length)
-        .filter(|_| is_timed);
+    let max_gap = longest(seen, ends_somewhere).filter(|_| is_timed);
+    let max_gap = max_gap.map(length);
     let within = within.filter(|_| is_timed).or_else(|| {
         // A topic without such a fact is only required to send at all.
         let is_required = hz.is_some() || mean_hz.is_some() || max_gap.is_some();
@@ -385,7 +366,7 @@ fn topic(seen: &[TopicIn<'_>], times: &Times, is_optional: bool) -> Line {
         ("within", within),
         ("may_end", may_end.filter(|_| is_timed)),
         ("latched", flag(is_latched, "true")),
-        ("optional", flag(is_optional, "true")),
+        ("optional", flag(seen.len() < times.runs, "true")),
     ]);
     if hz.is_none() && mean_hz.is_none() && !is_latched {
         line.comment = format!("  # {}: rate not checked", unjudged(seen, &rates.concat()));
@@ -400,9 +381,8 @@ fn mean(seen: &[TopicIn<'_>], hz: Option<Range>) -> Option<Range> {
     let rates: Vec<Rate> = rates.collect::<Option<_>>()?;
     let fewest = rates.iter().map(|r| r.count).min()?;
     let (least, most) = extremes(&rates);
-    let is_shown = hz
-        .and_then(|hz| hz.from)
-        .is_some_and(|from| from >= least * (1.0 - MEAN_SHARE));
+    let shown = hz.and_then(|hz| hz.from);
+    let is_shown = shown.is_some_and(|from| from >= least * (1.0 - MEAN_SHARE));
     if is_shown || fewest + 1 < FEWEST_OF_MEAN {
         return None;
     }
@@ -431,7 +411,7 @@ fn unjudged(seen: &[TopicIn<'_>], rates: &[Rate]) -> String {
     let counts = seen.iter().map(|s| s.facts.messages(s.id));
     let count = counts.max().unwrap_or(0);
     if count < FEWEST || rates.len() < 2 {
-        return words::count(usize::try_from(count).unwrap_or(usize::MAX), "message");
+        return words::count(count, "message");
     }
     let [least, most] = [least, most].map(|hz| Some(words::significant(hz, 2)));
     words::rate_range(least, most)
@@ -443,22 +423,14 @@ fn longest(seen: &[TopicIn<'_>], may_end: bool) -> Option<i64> {
     let longest = seen.iter().map(silence).collect::<Option<Vec<i64>>>()?;
     let usual = |s: &TopicIn<'_>| {
         let mean = s.facts.mean(s.id)?;
-        i64::try_from(mean.count)
-            .ok()
-            .map(|count| mean.span.nanos() / count)
+        Some(mean.span.nanos() / i64::try_from(mean.count).ok()?)
     };
-    let usual = seen
-        .iter()
-        .filter_map(usual)
-        .max()?
-        .saturating_mul(INTERVALS);
+    let usual = seen.iter().filter_map(usual).max()?;
     let longest = longest.into_iter().max()?.saturating_mul(GAPS);
-    let gap = longest.max(usual).max(GAP_NS);
-    let life = seen
-        .iter()
-        .filter_map(|s| s.facts.received(s.id))
-        .map(|h| h.nanos());
-    (gap < life.min()? / 2).then(|| two_digits(gap))
+    let gap = longest.max(usual.saturating_mul(INTERVALS)).max(GAP_NS);
+    let life = |s: &TopicIn<'_>| Some(s.facts.received(s.id)?.nanos());
+    let life = seen.iter().filter_map(life).min()?;
+    (gap < life / 2).then(|| two_digits(gap))
 }
 
 /// The range around the median rate that covers noise and every window seen; `None` for bursty topics, where it would
@@ -476,11 +448,8 @@ fn band(rates: &[Rate], is_even: bool, pause: f64) -> Option<Range> {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n;
-    let typical = rates
-        .iter()
-        .map(|r| r.hz() / (r.count as f64).max(1.0))
-        .fold(0.0, f64::max);
-    let chance = libm::sqrt(median * typical);
+    let typical = rates.iter().map(|r| r.hz() / (r.count as f64).max(1.0));
+    let chance = libm::sqrt(median * typical.fold(0.0, f64::max));
     let spread = libm::sqrt(variance).max(if is_even { 0.0 } else { chance });
     let margin = (median * SHARE).max(spread * SPREADS);
     let seconds = rates.iter().map(Rate::seconds).fold(0.0, f64::max);
@@ -495,19 +464,11 @@ fn band(rates: &[Rate], is_even: bool, pause: f64) -> Option<Range> {
 
 /// The value to three digits, rounded by `round`.
 fn rounded(value: f64, round: fn(f64) -> f64) -> f64 {
-    let power = 2.0 - libm::floor(libm::log10(value));
-    let scale = libm::pow(10.0, libm::fabs(power));
-    // A sum of 110.00000000000001 is 110, whichever way it is rounded.
-    let whole = |digits: f64| match libm::round(digits) {
+    words::to_digits(value, 3, |digits| match libm::round(digits) {
+        // A sum of 110.00000000000001 is 110, whichever way it is rounded.
         near if (digits - near).abs() < 1e-9 * near => near,
         _ => round(digits),
-    };
-    // Dividing by a power of ten keeps 0.3 exact.
-    if power >= 0.0 {
-        whole(value * scale) / scale
-    } else {
-        whole(value / scale) * scale
-    }
+    })
 }
 
 /// A length of time in the command line's syntax.
@@ -549,9 +510,9 @@ fn scalar(text: &str) -> String {
 }
 
 /// Names as a list on one line.
-fn list<'a>(names: impl Iterator<Item = &'a String>) -> String {
-    let names: Vec<String> = names.map(|name| scalar(name)).collect();
-    format!("[{}]", names.join(", "))
+fn list(names: &BTreeSet<String>) -> String {
+    let names = names.iter().map(|name| scalar(name));
+    format!("[{}]", words::joined(names, ", "))
 }
 
 #[cfg(test)]

@@ -249,8 +249,7 @@ fn elements<'a>(
 /// The topics with messages, without housekeeping.
 fn topics<'a>(facts: &'a Facts<'a>) -> BTreeMap<&'a str, TopicIn<'a>> {
     let all = facts.robot_topics();
-    all.map(|id| (facts.topic(id), TopicIn { facts, id }))
-        .collect()
+    all.map(|topic| (topic.name(), topic)).collect()
 }
 
 /// The names in only one of these.

@@ -402,22 +402,16 @@ fn section(pairs: Pairs<Keyed<Entry>>, known: &str) -> Result<Vec<Named>, BadYam
 
 /// Refuses keys that are none of these.
 fn check_keys(keys: &[At<String>], known: &[&str]) -> Result<(), BadYaml> {
-    let mut unknown = keys.iter().filter(|key| !known.contains(&&*key.value));
-    let bad = unknown
-        .next()
-        .map(|key| BadYaml::unknown_key(key.at, &key.value, known));
-    bad.map_or(Ok(()), Err)
+    match keys.iter().find(|key| !known.contains(&&*key.value)) {
+        Some(key) => Err(BadYaml::unknown_key(key.at, &key.value, known)),
+        None => Ok(()),
+    }
 }
 
 fn rule(At { at, value }: At<Keyed<Entry>>) -> Result<Rule, BadYaml> {
-    let Keyed {
-        keys,
-        value: mut entry,
-    } = value;
-    let known = FORMS
-        .iter()
-        .flat_map(|(form, with)| with.split(' ').chain([*form]));
-    let known: BTreeSet<&str> = known.chain(["id"]).collect();
+    let (keys, mut entry) = (value.keys, value.value);
+    let known = FORMS.map(|(form, with)| with.split(' ').chain([form]));
+    let known: BTreeSet<&str> = known.into_iter().flatten().chain(["id"]).collect();
     check_keys(&keys, &known.into_iter().collect::<Vec<_>>())?;
     let Some(At { value: id, .. }) = entry.id.0.take() else {
         let hint = "every rule has an `id: a-name`";

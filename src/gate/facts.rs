@@ -70,7 +70,11 @@ pub(crate) struct TopicIn<'a> {
     pub(crate) id: TopicId,
 }
 
-impl TopicIn<'_> {
+impl<'a> TopicIn<'a> {
+    pub(crate) fn name(&self) -> &'a str {
+        self.facts.topic(self.id)
+    }
+
     /// Whether its last message is longer before the mission's end than these nanoseconds.
     pub(crate) fn ends(&self, closing: i64) -> bool {
         let received = self.facts.received(self.id);
@@ -226,17 +230,12 @@ impl<'a> Facts<'a> {
 
     /// The present roles.
     pub(crate) fn roles(&self) -> impl Iterator<Item = Role<'_>> {
-        self.roles
-            .iter()
-            .map(|(name, nodes)| self.role_of(name, nodes))
+        self.roles.iter().map(|own| self.role_of(own))
     }
 
-    fn role_of<'s>(&'s self, name: &'s str, nodes: &'s [NodeId]) -> Role<'s> {
-        Role {
-            facts: self,
-            name,
-            nodes,
-        }
+    fn role_of<'s>(&'s self, (name, nodes): (&&'s str, &'s Vec<NodeId>)) -> Role<'s> {
+        let facts = self;
+        Role { facts, name, nodes }
     }
 
     /// The roles that a pattern matches; a node name matches its role too.
@@ -245,12 +244,9 @@ impl<'a> Facts<'a> {
         if pattern.is_name() {
             let own = self.names.get(name).copied();
             let roles: BTreeSet<&str> = own.into_iter().chain([name]).collect();
-            let found = roles
-                .into_iter()
-                .filter_map(|role| self.roles.get_key_value(role));
-            return found
-                .map(|(name, nodes)| self.role_of(name, nodes))
-                .collect();
+            let found = roles.into_iter();
+            let found = found.filter_map(|role| self.roles.get_key_value(role));
+            return found.map(|own| self.role_of(own)).collect();
         }
         let fits = |role: &Role<'_>| {
             pattern.matches(role.name)
@@ -270,11 +266,8 @@ impl<'a> Facts<'a> {
             let own = self.mission.elements.topic(pattern.as_str());
             return own.into_iter().filter(|id| self.is_there(*id)).collect();
         }
-        let topics = self.mission.elements.topics.with_ids();
-        topics
-            .filter(|(id, topic)| pattern.matches(topic.name.as_str()) && self.is_there(*id))
-            .map(|(id, _)| id)
-            .collect()
+        let fits = |id: &TopicId| pattern.matches(self.topic(*id)) && self.is_there(*id);
+        self.mission.elements.topics.ids().filter(fits).collect()
     }
 
     /// Whether a topic was observed, not only declared: with messages, an observed publisher, or no observed
@@ -333,9 +326,10 @@ impl<'a> Facts<'a> {
     }
 
     /// The topics with messages, without housekeeping.
-    pub(crate) fn robot_topics(&self) -> impl Iterator<Item = TopicId> {
+    pub(crate) fn robot_topics(&self) -> impl Iterator<Item = TopicIn<'_>> {
         let all = self.topics(&Pattern::new("**")).into_iter();
-        all.filter(|id| !self.is_housekeeping(*id) && self.messages(*id) > 0)
+        let own = all.filter(|id| !self.is_housekeeping(*id) && self.messages(*id) > 0);
+        own.map(|id| TopicIn { facts: self, id })
     }
 
     /// The publishers of a topic, except unnamed nodes.
@@ -481,16 +475,8 @@ impl<'a> Facts<'a> {
         let event = started.into_iter().find(|e| e.time >= first);
         let is_first = |e: &&Event| e.time.since(first) < 1_000_000_000;
         Some(match event.filter(is_first) {
-            Some(event) => Bound {
-                time: event.time,
-                earliest: event.earliest,
-                latest: event.latest,
-            },
-            None => Bound {
-                time: first,
-                earliest: Stamp::MIN,
-                latest: first,
-            },
+            Some(event) => Bound::new(event.time, event.earliest, event.latest),
+            None => Bound::new(first, Stamp::MIN, first),
         })
     }
 
@@ -503,11 +489,7 @@ impl<'a> Facts<'a> {
         let stopped = self.events(nodes, Kind::Stopped);
         let bounds = stopped.last().map(|e| (e.earliest, e.latest));
         let (earliest, latest) = bounds.unwrap_or((time, time));
-        Some(Bound {
-            time,
-            earliest,
-            latest,
-        })
+        Some(Bound::new(time, earliest, latest))
     }
 
     /// Whether a role is only known from its log: nothing else of it was recorded, and no evidence lists all nodes.
@@ -579,11 +561,8 @@ impl<'a> Facts<'a> {
             }
         }
         // A topic that exists for little more than a window rarely fills one, so a part is used.
-        if all.is_empty() {
-            first.into_iter().collect()
-        } else {
-            all
-        }
+        all.extend(first.filter(|_| all.is_empty()));
+        all
     }
 
     /// The rate of a topic from its first to its last message, as one that covers all of it; `None` with fewer than
@@ -654,7 +633,9 @@ impl<'a> Facts<'a> {
                 });
             }
         }
-        all.extend(self.pauses(topic).filter_map(|gap| clipped(gap, during)));
+        // Known if single messages are.
+        let pauses = self.mission.sending.pauses.of(topic).iter();
+        all.extend(pauses.filter_map(|gap| clipped(*gap, during)));
         let whole = self.mission.span;
         if let (Some(received), false) = (self.received(topic), may_end) {
             let span = Span::new(received.end.plus(-1), whole.end);
@@ -681,12 +662,6 @@ impl<'a> Facts<'a> {
     pub(crate) fn longest_of(&self, topic: TopicId, may_end: bool) -> Option<i64> {
         let silences = self.silences(topic, may_end, self.mission.span);
         silences.iter().map(|silence| silence.nanos).max()
-    }
-
-    /// The longest times between two messages, if single messages are known.
-    fn pauses(&self, topic: TopicId) -> impl Iterator<Item = Span> + use<'a> {
-        let pauses = self.mission.sending.pauses.get(topic);
-        pauses.into_iter().flatten().copied()
     }
 
     /// The cause in the event log for the change of a topic around a time: an event of one of these `kinds` of its publishers,

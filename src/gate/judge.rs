@@ -190,17 +190,18 @@ impl Judge<'_> {
                 self.topic_facts(&title, name, entry);
             }
         }
-        let (mission, is_part) = (self.facts.mission, self.is_part);
-        for finding in self.found_since(before) {
+        self.complete(before, entry, |finding| {
             finding.accept = Some(name.to_string());
-            finding.is_open = is_open(finding, entry, mission, is_part);
-        }
+        });
     }
 
-    /// The findings of all checks but the first ones.
-    fn found_since(&mut self, before: usize) -> impl Iterator<Item = &mut Finding> {
+    /// Completes the findings of all checks but the first ones, which are about these facts.
+    fn complete(&mut self, before: usize, entry: &Entry, add: impl Fn(&mut Finding)) {
         let checks = self.checks[before..].iter_mut();
-        checks.flat_map(|check| &mut check.findings)
+        for finding in checks.flat_map(|check| &mut check.findings) {
+            add(finding);
+            finding.is_open = is_open(finding, entry, self.facts.mission, self.is_part);
+        }
     }
 
     /// Adds the findings of one fact.
@@ -236,30 +237,28 @@ impl Judge<'_> {
 
     /// Checks a rule.
     fn rule(&mut self, rule: &Rule) {
-        let before = self.checks.len();
-        match &rule.demand {
+        let (before, nothing) = (self.checks.len(), Entry::default());
+        let entry = match &rule.demand {
             Demand::Nodes(names, entry) => {
                 for name in names {
                     self.node_rule(rule, name, entry);
                 }
+                entry
             }
-            Demand::Topic(name, entry) => self.topic_rule(rule, name, entry),
+            Demand::Topic(name, entry) => {
+                self.topic_rule(rule, name, entry);
+                entry
+            }
             Demand::Changes { during, many } => {
                 let found = self.changes(rule.at, *during, *many);
                 self.note(&rule.id, rule.at, found.into_iter().collect());
+                &nothing
             }
-        }
-        let detail = format!("rule {}", words::visible(&rule.id));
-        let (mission, is_part) = (self.facts.mission, self.is_part);
-        for finding in self.found_since(before) {
+        };
+        let detail = format!("rule {}", visible(&rule.id));
+        self.complete(before, entry, |finding| {
             finding.details.push(detail.clone());
-            finding.is_open = match &rule.demand {
-                Demand::Nodes(_, entry) | Demand::Topic(_, entry) => {
-                    is_open(finding, entry, mission, is_part)
-                }
-                Demand::Changes { .. } => true,
-            };
-        }
+        });
     }
 
     fn node_rule(&mut self, rule: &Rule, name: &At<Pattern>, entry: &Entry) {
@@ -425,7 +424,7 @@ impl Judge<'_> {
 
     fn strange_topics(&self, severity: Severity) -> Vec<Finding> {
         let known: NamePatterns<'_> = self.expectation.topics.iter().map(|t| &t.name).collect();
-        let names = self.facts.robot_topics().map(|id| self.facts.topic(id));
+        let names = self.facts.robot_topics().map(|topic| topic.name());
         let strange = names.filter(|name| !known.hold(name));
         strange
             .map(|name| self.strange(FindingKind::UnexpectedTopic, name, name, severity))

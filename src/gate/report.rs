@@ -139,23 +139,19 @@ impl Subject<'_> {
     /// The bags by their names, without folders.
     fn name(&self) -> String {
         let names = self.mission.bags.iter();
-        let names = names.map(|bag| words::visible(&bag.name).into_owned());
-        let names: Vec<String> = names.collect();
-        match &names[..] {
-            [] => words::some_of(&self.bags, 2),
-            names => words::some_of(names, 2),
+        let names = names.map(|bag| visible(&bag.name));
+        match words::some_of(names, 2) {
+            none if none.is_empty() => words::some_of(&self.bags, 2),
+            some => some,
         }
     }
 
     /// The command that accepts the findings about these names; all findings without one.
     fn accept(&self, names: &BTreeSet<&str>) -> String {
-        let bags: Vec<String> = self.bags.iter().map(|bag| quoted(bag)).collect();
+        let bags = words::joined(self.bags.iter().map(|bag| quoted(bag)), " ");
         let only = names.iter().map(|name| format!(" --only {}", quoted(name)));
-        let (bags, file) = (bags.join(" "), quoted(&self.file));
-        format!(
-            "bagreel baseline {bags} --update {file}{}",
-            only.collect::<String>()
-        )
+        let (only, file) = (only.collect::<String>(), quoted(&self.file));
+        format!("bagreel baseline {bags} --update {file}{only}")
     }
 }
 
@@ -189,12 +185,12 @@ fn quoted(text: &str) -> String {
 pub(crate) fn explain(word: &str, width: usize) -> Result<String> {
     let words = || KINDS.iter().map(|row| row.word);
     let Some(kind) = FindingKind::from_word(word) else {
-        let near = suggestion(word, words());
-        let all: Vec<&str> = words().collect();
-        return Err(Error::usage(
-            format!("unknown kind of finding `{word}`{near}"),
-            format!("choose one of {}", all.join(", ")),
-        ));
+        let what = format!(
+            "unknown kind of finding `{word}`{}",
+            suggestion(word, words())
+        );
+        let hint = format!("choose one of {}", words::joined(words(), ", "));
+        return Err(Error::usage(what, hint));
     };
     let row = kind.row();
     let [meaning, more] = [row.meaning, row.more].map(|text| hang("", text, 0, Some(width)));
@@ -207,14 +203,7 @@ struct Group<'a> {
     findings: Vec<&'a Finding>,
 }
 
-impl Group<'_> {
-    /// The worst severity.
-    fn worst(&self) -> Option<Severity> {
-        self.findings.first().map(|finding| finding.severity)
-    }
-}
-
-/// The findings grouped by cause, ordered by the worst of each; those without a cause are separate.
+/// The findings, the worst first, grouped by cause; those without a cause are separate.
 fn grouped<'a>(findings: &[&'a Finding]) -> Vec<Group<'a>> {
     let mut groups: Vec<Group<'_>> = Vec::new();
     let mut places: BTreeMap<&str, usize> = BTreeMap::new();

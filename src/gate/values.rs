@@ -165,6 +165,12 @@ impl Range {
         self.to.is_some_and(|to| value > to)
     }
 
+    /// The range with its ends as `end` writes them.
+    pub(crate) fn shown(&self, end: impl Fn(f64) -> String) -> String {
+        let [from, to] = [self.from, self.to].map(|own| own.map(&end).unwrap_or_default());
+        format!("{from}..{to}")
+    }
+
     /// Whether the number is in it.
     pub(crate) fn holds(&self, value: f64) -> bool {
         !self.is_above(value) && !self.is_below(value)
@@ -173,14 +179,7 @@ impl Range {
 
 impl fmt::Display for Range {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some(from) = self.from {
-            write!(f, "{from}")?;
-        }
-        f.write_str("..")?;
-        match self.to {
-            Some(to) => write!(f, "{to}"),
-            None => Ok(()),
-        }
+        f.write_str(&self.shown(|end| end.to_string()))
     }
 }
 
@@ -302,12 +301,6 @@ impl Measure {
     pub(crate) fn range(&self, text: &str) -> Option<Range> {
         Range::parse_ends(text, self.parse)
     }
-
-    /// Formats a range.
-    pub(crate) fn range_shown(&self, range: Range) -> String {
-        let end = |end: Option<f64>| end.map(self.shown).unwrap_or_default();
-        format!("{}..{}", end(range.from), end(range.to))
-    }
 }
 
 /// `5MB/s`, `800 kB/s`, `1000`.
@@ -398,7 +391,7 @@ mod tests {
     fn ranges_have_units() {
         let shown = |at: usize, text: &str| {
             let measure = &MEASURES[at];
-            measure.range(text).map(|range| measure.range_shown(range))
+            measure.range(text).map(|range| range.shown(measure.shown))
         };
         assert_eq!(shown(0, "..0.2s").as_deref(), Some("..200 ms"));
         assert_eq!(shown(0, "5ms..1m").as_deref(), Some("5 ms..1 min"));

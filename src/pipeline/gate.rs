@@ -16,8 +16,8 @@ use crate::export::check::{check as check_targets, make_folder};
 use crate::export::sink::write_file;
 use crate::export::target::Target;
 use crate::gate::{
-    DiffSubject, Difference, Expectation, ReportFormat, Runs, Side, Subject, Verdict, differences,
-    judge, pairs, unchecked, union, update, write,
+    DiffSubject, Difference, Expectation, ReportFormat, Side, Subject, Verdict, differences, judge,
+    pairs, unchecked, union, update, write,
 };
 use crate::graph::window::Length;
 use crate::mission::{Mission, RATE_CHANGE};
@@ -38,24 +38,22 @@ impl Report {
         let output = output.as_ref();
         let text = output.to_string_lossy();
         let named = text.split_once(':');
-        if let Some((format, path)) =
-            named.and_then(|(word, path)| Some((ReportFormat::from_word(word)?, path)))
-        {
-            return Ok(Self {
-                target: Target::parse(path),
-                format,
-            });
-        }
+        let named = named.and_then(|(word, path)| Some((ReportFormat::from_word(word)?, path)));
+        let (format, target) = match named {
+            Some((format, path)) => (Some(format), Target::parse(path)),
+            None => (
+                ReportFormat::of_name(&text, |_| true),
+                Target::parse(output),
+            ),
+        };
         let unknown = || {
             Error::usage(
                 format!("`{text}` has no known extension"),
                 "use the extension .md, .xml, .json, .sarif or .txt, or put the format in front: `gitlab:FILE`",
             )
         };
-        Ok(Self {
-            target: Target::parse(output),
-            format: ReportFormat::of_name(&text, |_| true).ok_or_else(unknown)?,
-        })
+        let format = format.ok_or_else(unknown)?;
+        Ok(Self { target, format })
     }
 }
 
@@ -248,10 +246,9 @@ impl Diff {
 /// The names of two missions, without folders unless the names differ only in these.
 fn subject(readings: &[Reading; 2]) -> DiffSubject {
     let names = |name: fn(&Input) -> String| {
-        readings.each_ref().map(|reading| {
-            let all: Vec<String> = reading.inputs.iter().map(name).collect();
-            words::some_of(&all, 2)
-        })
+        readings
+            .each_ref()
+            .map(|reading| words::some_of(reading.inputs.iter().map(name), 2))
     };
     let short = names(Input::name);
     let [first, second] = if short[0] == short[1] {
@@ -290,17 +287,13 @@ pub fn diff(job: &Diff, watch: &mut dyn Watch) -> Result<Compared> {
     let is_part = job.readings.iter().any(is_part);
     let differences = differences(&first, &second, job.rate_change, is_part);
     for report in &job.reports {
-        put(
-            &report.target,
-            job.report(&differences, report.format).as_bytes(),
-        )?;
+        let text = job.report(&differences, report.format);
+        put(&report.target, text.as_bytes())?;
     }
     // Animations show the first mission and then both; stills show both.
-    let (moving, standing): (Vec<Output>, Vec<Output>) = job
-        .pictures
-        .iter()
-        .cloned()
-        .partition(|o| MOVING.contains(&o.format.word));
+    let pictures = job.pictures.iter().cloned();
+    let (moving, standing): (Vec<Output>, Vec<Output>) =
+        pictures.partition(|o| MOVING.contains(&o.format.word));
     let mut remarks = BTreeSet::new();
     for (outputs, side) in [(moving, Side::Each), (standing, Side::Both)] {
         if outputs.is_empty() {
@@ -311,17 +304,13 @@ pub fn diff(job: &Diff, watch: &mut dyn Watch) -> Result<Compared> {
         render.drawing = job.drawing.clone();
         let page = &mut render.drawing.page;
         page.rate_change = job.rate_change.unwrap_or(RATE_CHANGE);
-        let DiffSubject {
-            first: a,
-            second: b,
-        } = &job.subject;
+        let (a, b) = (&job.subject.first, &job.subject.second);
         page.title.get_or_insert_with(|| format!("A: {a} → B: {b}"));
         let missions = [&first, &second];
         let pairs = pairs(missions, &job.subject, &differences, &mission);
         render.sequence.pairs = (!pairs.rows.is_empty()).then_some(pairs);
         let done = show(&render, mission, watch)?;
-        let of_files = done.written.iter().flat_map(|w| w.remarks.clone());
-        remarks.extend(of_files);
+        remarks.extend(done.written.into_iter().flat_map(|w| w.remarks));
         remarks.extend(done.mission.notices.iter().map(|n| n.text));
     }
     Ok(Compared {
@@ -399,28 +388,23 @@ pub fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<BaselineWritten
         period = period.or(Some(mission.period));
         missions.push(mission);
     }
-    let mut done = BaselineWritten {
-        missions,
-        ..BaselineWritten::default()
-    };
     let is_part = job.runs.iter().any(is_part);
-    let text = if let Some((path, (text, _))) = old {
-        let runs = Runs {
-            missions: &done.missions,
-            is_part,
-        };
-        let new = update(&text, path, runs, &job.only)?;
-        (done.changed, done.left) = (new.changed, new.left);
-        new.text
+    let new = if let Some((path, (text, _))) = old {
+        update(&text, path, &missions, is_part, &job.only)?
     } else {
-        let names = done.missions.iter().filter_map(|run| run.bags.first());
-        let names: Vec<&str> = names.map(|bag| bag.name.as_str()).collect();
-        let new = write(&done.missions, is_part, &words::some_of(&names, 3));
-        (done.nodes, done.topics, done.left_out) = (new.nodes, new.topics, new.left_out);
-        new.text
+        let names = missions.iter().filter_map(|run| run.bags.first());
+        let names = words::some_of(names.map(|bag| &bag.name), 3);
+        write(&missions, is_part, &names)
     };
-    put(&target, text.as_bytes())?;
-    Ok(done)
+    put(&target, new.text.as_bytes())?;
+    Ok(BaselineWritten {
+        missions,
+        changed: new.changed,
+        left: new.left,
+        nodes: new.nodes,
+        topics: new.topics,
+        left_out: new.left_out,
+    })
 }
 
 /// Whether only a part of a recording is read, in which start times differ from those in the whole.

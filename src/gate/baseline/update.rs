@@ -1,9 +1,9 @@
 //! Updates an expectation: rewrites facts that are no longer true and keeps every other character.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use super::{Draft, Line, length, scalar, two_digits, whole};
+use super::{Draft, Line, Written, length, scalar, two_digits, whole};
 use crate::base::error::{Error, Result};
 use crate::base::nearest::suggestion;
 use crate::base::words;
@@ -18,32 +18,20 @@ use crate::mission::Mission;
 /// file would remain.
 const MOST: usize = 1000;
 
-/// An updated expectation.
-#[derive(Debug)]
-pub(crate) struct Update {
-    /// The whole file.
-    pub(crate) text: String,
-    /// The number of rewritten facts.
-    pub(crate) changed: usize,
-    /// The number of findings that only the author of a rule can resolve.
-    pub(crate) left: usize,
-}
-
-/// The runs by which an expectation is updated.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Runs<'a> {
-    pub(crate) missions: &'a [Mission],
-    /// Whether each is a part of a recording, whose times are meaningless.
-    pub(crate) is_part: bool,
-}
-
-/// Rewrites the facts that these runs break: for all names, or for those in `only`.
+/// Rewrites the facts that these runs break: for all names, or for those in `only`. Times do not count if each run `is_part` of a
+/// recording.
 ///
 /// # Errors
 /// As [`read`], and if the file cannot be edited in place.
-pub(crate) fn update(text: &str, path: &Path, runs: Runs<'_>, only: &[String]) -> Result<Update> {
+pub(crate) fn update(
+    text: &str,
+    path: &Path,
+    runs: &[Mission],
+    is_part: bool,
+    only: &[String],
+) -> Result<Written> {
     let expectation = read(text, path)?;
-    let draft = Draft::of(runs.missions, runs.is_part);
+    let draft = Draft::of(runs, is_part);
     for name in only {
         known(name, &expectation, &draft)?;
     }
@@ -51,9 +39,14 @@ pub(crate) fn update(text: &str, path: &Path, runs: Runs<'_>, only: &[String]) -
         text: EditedText(text.to_owned()),
         expectation: &expectation,
         draft: &draft,
-        runs: runs.missions,
+        runs,
     };
-    let findings = broken(&expectation, runs);
+    let checks = |run| judge(&expectation, run, is_part).checks;
+    let found = runs
+        .iter()
+        .flat_map(checks)
+        .flat_map(|check| check.findings);
+    let findings: Vec<Finding> = found.filter(|f| f.severity != Severity::Unknown).collect();
     let left = findings.iter().filter(|f| f.accept.is_none()).count();
     let mut seen = BTreeSet::new();
     let named = findings
@@ -84,10 +77,11 @@ pub(crate) fn update(text: &str, path: &Path, runs: Runs<'_>, only: &[String]) -
     }
     let text = work.text.0;
     read(&text, path)?;
-    Ok(Update {
+    Ok(Written {
         text,
         changed,
         left,
+        ..Written::default()
     })
 }
 
@@ -96,10 +90,8 @@ fn known(name: &str, expectation: &Expectation, draft: &Draft) -> Result<()> {
     let nodes = expectation.nodes.iter().map(|n| n.name.as_str());
     let topics = expectation.topics.iter().map(|t| t.name.as_str());
     let seen = draft.nodes.keys().chain(draft.topics.keys());
-    let all: BTreeSet<&str> = nodes
-        .chain(topics)
-        .chain(seen.map(String::as_str))
-        .collect();
+    let all = nodes.chain(topics).chain(seen.map(String::as_str));
+    let all: BTreeSet<&str> = all.collect();
     if all.contains(name) {
         return Ok(());
     }
@@ -114,18 +106,6 @@ fn unchanged(path: &Path, bad: &BadYaml) -> Error {
     let reason = format!("this cannot be changed in place: {}", bad.reason);
     let hint = "write the element as `/name: {key: value}` on one line";
     Error::bad_place(path, [bad.at.line, bad.at.column], &reason, hint)
-}
-
-/// The findings of these runs.
-fn broken(expectation: &Expectation, runs: Runs<'_>) -> Vec<Finding> {
-    let missions = runs.missions.iter();
-    let verdicts = missions.map(|run| judge(expectation, run, runs.is_part));
-    let findings = verdicts
-        .flat_map(|verdict| verdict.checks)
-        .flat_map(|check| check.findings);
-    findings
-        .filter(|f| f.severity != Severity::Unknown)
-        .collect()
 }
 
 /// An update in progress.
@@ -199,13 +179,7 @@ impl Work<'_> {
     /// The value of a node's key common to all runs; for a pattern, common to all matching nodes.
     fn of_node(&self, name: &str, key: &str) -> Option<String> {
         let pattern = Pattern::new(name);
-        let lines = self
-            .draft
-            .nodes
-            .iter()
-            .filter(|(role, _)| pattern.matches(role));
-        let lines: Vec<&Line> = lines.map(|(_, line)| line).collect();
-        match (key, &lines[..]) {
+        match (key, &matching(&self.draft.nodes, &pattern)[..]) {
             ("within", [line]) => line.get(key).or_else(|| self.began(&pattern)),
             ("within", _) => self.began(&pattern),
             (_, [line]) => line.get(key),
@@ -241,16 +215,11 @@ impl Work<'_> {
         if key == "max_gap" {
             return self.longest(&pattern);
         }
-        // A value that differs between the topics of a pattern is not used.
-        let lines = self
-            .draft
-            .topics
-            .iter()
-            .filter(|(topic, _)| pattern.matches(topic));
-        let [line] = lines.map(|(_, line)| line).collect::<Vec<_>>()[..] else {
-            return None;
-        };
-        line.get(key)
+        match matching(&self.draft.topics, &pattern)[..] {
+            [line] => line.get(key),
+            // A value that differs between the topics of a pattern is not used.
+            _ => None,
+        }
     }
 
     fn longest(&self, pattern: &Pattern) -> Option<String> {
@@ -285,6 +254,12 @@ impl Work<'_> {
             None => Ok(()),
         }
     }
+}
+
+/// The lines of the names that a pattern matches.
+fn matching<'a>(lines: &'a BTreeMap<String, Line>, pattern: &Pattern) -> Vec<&'a Line> {
+    let own = lines.iter().filter(|(name, _)| pattern.matches(name));
+    own.map(|(_, line)| line).collect()
 }
 
 /// A YAML text in which single values are changed; every other character stays as it is.

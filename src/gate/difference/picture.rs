@@ -13,7 +13,7 @@ use crate::draw::timeline::{FigureSource, Timeline};
 use crate::evidence::{Confidence, Evidence};
 use crate::gate::facts::{Facts, Peer, TopicIn};
 use crate::gate::values::Pattern;
-use crate::graph::history::Sending;
+use crate::graph::history::{Bound, Sending};
 use crate::graph::{
     ById, Edge, Element, ElementState, Elements, Existence, Graph, Node, NodeId, State, Topic,
 };
@@ -130,10 +130,8 @@ pub(crate) fn union(
     let window = |(index, (span, seen)): (usize, &(Span, &MissionSide))| Window {
         index,
         span: *span,
-        partial: false,
         messages: seen.values().filter_map(|known| known.count).sum(),
-        changes: Vec::new(),
-        events: Vec::new(),
+        ..Window::default()
     };
     let windows: Vec<Window> = shown.iter().enumerate().map(window).collect();
     let graphs = shown.iter();
@@ -331,18 +329,10 @@ impl UnionLog<'_> {
         part_of: Option<EventId>,
     ) -> EventId {
         self.events.push(Event {
-            kind,
-            what,
-            time: AT,
-            earliest: AT,
-            latest: AT,
-            until: None,
             detail,
-            confidence: Confidence::Measured,
             evidence: self.elements.evidence(what),
             part_of,
-            quiet: false,
-            weight: 1,
+            ..Event::new(kind, what, Bound::new(AT, AT, AT))
         })
     }
 }

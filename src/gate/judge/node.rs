@@ -120,8 +120,7 @@ impl Judge<'_> {
         if own.is_empty() || sends_others || own.iter().any(is_sent) {
             return None;
         }
-        let own: Vec<&str> = own.into_iter().map(Pattern::as_str).collect();
-        let topics = words::some_of(&own, NAMED);
+        let topics = words::some_of(own.into_iter().map(Pattern::as_str), NAMED);
         let text = format!("{pattern} sends nothing: {topics} without a message");
         let finding = Finding::new(FindingKind::NodeMissing, pattern.as_str(), at, text);
         Some(finding.saw("no message", topics))

@@ -14,8 +14,7 @@ use crate::mission::event_log::Kind;
 
 /// The names of a list, in short.
 fn listed(names: &Names) -> String {
-    let names: Vec<&str> = names.0.iter().map(|name| name.value.as_str()).collect();
-    words::some_of(&names, NAMED)
+    words::some_of(names.0.iter().map(|name| name.value.as_str()), NAMED)
 }
 
 impl Judge<'_> {
@@ -52,10 +51,9 @@ impl Judge<'_> {
         let found = self.facts.topics(pattern).into_iter().map(|topic| {
             let name = self.facts.topic(topic);
             let text = format!("{name} is in the bag, and `{pattern}` is forbidden");
-            let many = usize::try_from(self.facts.messages(topic)).unwrap_or(usize::MAX);
             Finding::new(FindingKind::TopicForbidden, name, at, text)
                 .saw("present", "absent")
-                .details([words::count(many, "message")])
+                .details([words::count(self.facts.messages(topic), "message")])
         });
         found.collect()
     }
@@ -155,7 +153,7 @@ impl Judge<'_> {
             let Some((span, count)) = self.facts.sent(peer.node, peer.edge) else {
                 return finding;
             };
-            let many = match usize::try_from(count).unwrap_or(usize::MAX) {
+            let many = match count {
                 0 => String::new(),
                 n => format!(", {}", words::count(n, "message")),
             };
@@ -177,13 +175,10 @@ impl Judge<'_> {
             let hint = "record /rosgraph, or add `--topology FILE`; see `bagreel info`";
             return Finding::unknown(kind, name, wanted.at, text).hints([hint]);
         }
-        let roles: Vec<&str> = known
-            .iter()
-            .map(|peer| self.facts.role(peer.node))
-            .collect();
-        let seen = match &roles[..] {
-            [] => "nobody".to_owned(),
-            roles => words::some_of(roles, NAMED),
+        let roles = known.iter().map(|peer| self.facts.role(peer.node));
+        let seen = match words::some_of(roles, NAMED) {
+            nobody if nobody.is_empty() => "nobody".to_owned(),
+            some => some,
         };
         let text = format!("{who} does not publish {name}, which is published by {seen}");
         let is_absent = self.facts.nodes(&wanted.value).is_empty();
@@ -266,49 +261,48 @@ impl Judge<'_> {
             (FindingKind::TopicRateLow, low),
             (FindingKind::TopicRateHigh, high),
         ];
-        let found = lines.into_iter().filter_map(|(kind, bad)| {
-            let off = OffRate {
-                topic,
-                kind,
-                bad: &bad,
-                judged: rates.len(),
-            };
-            self.off(&off, hz)
-        });
+        let judged = words::count(rates.len(), "window");
+        let found = lines.into_iter();
+        let found = found.filter_map(|(kind, bad)| self.off(topic, kind, &bad, &judged, hz));
         found.collect()
     }
 
-    /// The finding for the windows in which a rate was out of range.
-    fn off(&self, off: &OffRate<'_>, hz: &At<Range>) -> Option<Finding> {
+    /// The finding for the `bad` windows, of those `judged`, in which a rate was out of range.
+    fn off(
+        &self,
+        topic: TopicId,
+        kind: FindingKind,
+        bad: &[Rate],
+        judged: &str,
+        hz: &At<Range>,
+    ) -> Option<Finding> {
         let At { at, value: range } = *hz;
-        let (first, last) = (off.bad.first()?, off.bad.last()?);
-        let name = self.facts.topic(off.topic);
+        let (first, last) = (bad.first()?, bad.last()?);
+        let name = self.facts.topic(topic);
         let span = Span::new(first.span.start, last.span.end);
-        let seen = words::rate(Rate::mean_hz(off.bad));
+        let seen = words::rate(Rate::mean_hz(bad));
         let by = |a: &&Rate, b: &&Rate| a.hz().total_cmp(&b.hz());
-        let (word, worst) = if off.kind == FindingKind::TopicRateLow {
-            ("lowest", off.bad.iter().min_by(by)?)
+        let (word, worst) = if kind == FindingKind::TopicRateLow {
+            ("lowest", bad.iter().min_by(by)?)
         } else {
-            ("highest", off.bad.iter().max_by(by)?)
+            ("highest", bad.iter().max_by(by)?)
         };
         let text = format!("{name} at {seen}, expected {range}");
-        let count = usize::try_from(Rate::count(off.bad)).unwrap_or(usize::MAX);
         let detail = format!(
-            "{} ({} of {}), {word} {} at {}, {}",
+            "{} ({} of {judged}), {word} {} at {}, {}",
             self.facts.stretch(span),
-            off.bad.len(),
-            words::count(off.judged, "window"),
+            bad.len(),
             words::rate(worst.hz()),
             self.facts.clock(worst.span.start),
-            words::count(count, "message"),
+            words::count(Rate::count(bad), "message"),
         );
         let before = first.span.start.plus(-first.span.nanos() / 2);
         let around = Span::new(before, first.span.end);
-        let finding = Finding::new(off.kind, name, at, text)
+        let finding = Finding::new(kind, name, at, text)
             .saw(seen, words::rate_range(range.from, range.to))
             .at(span)
             .details([detail])
-            .because(self.facts.cause_for_topic(off.topic, ENDS, around));
+            .because(self.facts.cause_for_topic(topic, ENDS, around));
         Some(finding)
     }
 
@@ -471,7 +465,7 @@ impl Judge<'_> {
         let off = |value: f64| (value - to).max(from - value);
         let worst = bad.iter().max_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
         let span = Span::new(bad.first()?.0.start, bad.last()?.0.end);
-        let (seen, expected) = ((measure.shown)(worst.1), measure.range_shown(range));
+        let (seen, expected) = ((measure.shown)(worst.1), range.shown(measure.shown));
         let text = format!("{name} has {key} {seen}, expected {expected}");
         let detail = format!(
             "{} ({} of {}), worst at {}",
@@ -488,13 +482,4 @@ impl Judge<'_> {
             .because(self.facts.cause_for_topic(topic, ENDS, around));
         Some(finding)
     }
-}
-
-/// The windows in which a topic's rate was too low, or too high.
-struct OffRate<'a> {
-    topic: TopicId,
-    kind: FindingKind,
-    bad: &'a [Rate],
-    /// The number of windows in which it was checked.
-    judged: usize,
 }

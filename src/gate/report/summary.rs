@@ -34,7 +34,8 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let mut out = headline(subject, verdict) + "\n\n";
     // The most severe first, then those with the most consequences.
     let mut groups = grouped(&broken);
-    groups.sort_by_key(|group| (group.worst(), Reverse(group.findings.len())));
+    let worst = |group: &Group<'_>| group.findings.first().map(|finding| finding.severity);
+    groups.sort_by_key(|group| (worst(group), Reverse(group.findings.len())));
     causes(&groups, &mut out);
     findings_table(&facts, &groups, &mut out);
     if let Some(chart) = chart(&facts, &broken) {
@@ -273,14 +274,13 @@ fn written(
         let (open, close) = if own.0 { ("[", "]") } else { ("([", "])") };
         let mark = marked.get(own);
         let name = words::shorten(own.1, LONGEST);
-        // The expected and the observed value.
-        let more = match mark.map(|mark| (mark.kind, mark)) {
-            Some((
-                FindingKind::TopicRateLow | FindingKind::TopicRateHigh | FindingKind::NodeLifecycle,
-                mark,
-            )) => format!("{} → {}", mark.expected, mark.seen),
-            _ => String::new(),
+        let has_values = |mark: &&&Finding| {
+            use FindingKind::{NodeLifecycle, TopicRateHigh, TopicRateLow};
+            matches!(mark.kind, TopicRateLow | TopicRateHigh | NodeLifecycle)
         };
+        let more = mark.filter(has_values).map_or_else(String::new, |mark| {
+            format!("{} → {}", mark.expected, mark.seen)
+        });
         let text = escaped(format!("{name} {more}").trim_end());
         let class = mark.map_or_else(String::new, |mark| format!(":::{}", mark.kind.row().class));
         let line = format!("  i{at}{open}\"{text}\"{close}{class}\n");

@@ -20,10 +20,8 @@ pub(super) fn text(subject: &Subject<'_>, verdict: &Verdict) -> String {
             let many = words::count(group.findings.len(), "finding");
             let _ = writeln!(out, "{cause}: {many}");
         }
-        let known = group
-            .findings
-            .iter()
-            .filter(|f| f.severity != Severity::Unknown);
+        let known = group.findings.iter();
+        let known = known.filter(|f| f.severity != Severity::Unknown);
         let names: BTreeSet<&str> = known.filter_map(|f| f.accept.as_deref()).collect();
         for one in group.findings {
             finding(subject, one, is_one, &mut hinted, &mut out);
@@ -92,8 +90,16 @@ pub(super) fn github(subject: &Subject<'_>, verdict: &Verdict) -> String {
             let rest = own.len() - at - 1;
             let is_last = at + 1 == MOST && rest > 0;
             let more = is_last.then(|| format!(" (and {rest} more in the log)"));
-            let more = more.unwrap_or_default();
-            annotation(subject, command, finding, &more, &mut out);
+            let text = finding.text.clone() + &more.unwrap_or_default();
+            let text = words::joined([&text].into_iter().chain(&finding.details), "\n");
+            let _ = writeln!(
+                out,
+                "::{command} file={},line={},title={}::{}",
+                property(&subject.tracked),
+                finding.place.line.max(1),
+                property(finding.kind.word()),
+                data(&text)
+            );
         }
     }
     let text = text(subject, verdict);
@@ -101,25 +107,6 @@ pub(super) fn github(subject: &Subject<'_>, verdict: &Verdict) -> String {
         let _ = writeln!(out, "{}", inert(line));
     }
     inert_groups(&out)
-}
-
-fn annotation(
-    subject: &Subject<'_>,
-    command: &str,
-    finding: &Finding,
-    more: &str,
-    out: &mut String,
-) {
-    let details = finding.details.iter().map(|detail| format!("\n{detail}"));
-    let text = format!("{}{more}{}", finding.text, details.collect::<String>());
-    let _ = writeln!(
-        out,
-        "::{command} file={},line={},title={}::{}",
-        property(&subject.tracked),
-        finding.place.line.max(1),
-        property(finding.kind.word()),
-        data(&text)
-    );
 }
 
 /// Text after a command, escaped.
