@@ -7,6 +7,7 @@ use clap::parser::ValueSource;
 
 use super::args::Inference;
 use crate::base::error::{Error, Result};
+use crate::base::words;
 use crate::export::{OneDrawing, Output};
 use crate::pipeline::{Reading, mission_file};
 
@@ -27,7 +28,7 @@ impl Given {
     }
 
     /// Refuses these options for the reason `what`.
-    fn refuse(&self, options: &str, what: &str, hint: &str) -> Result<()> {
+    pub(super) fn refuse(&self, options: &str, what: &str, hint: &str) -> Result<()> {
         match self.any(options) {
             None => Ok(()),
             Some(option) => Err(Error::usage(format!("`--{option}` {what}"), hint)),
@@ -102,7 +103,7 @@ pub(super) fn check_outputs(given: &Given, is_one_window: bool, outputs: &[Outpu
     };
     let names = outputs.iter();
     let names = names.map(|o| format!("`{}`", o.target.path().display()));
-    let what = format!("has no effect on {}", names.collect::<Vec<_>>().join(", "));
+    let what = format!("has no effect on {}", words::joined(names, ", "));
     for (options, hint) in RULES {
         for option in options.split(' ').filter(|option| !applies(option)) {
             given.refuse(option, &what, hint)?;
@@ -113,10 +114,8 @@ pub(super) fn check_outputs(given: &Given, is_one_window: bool, outputs: &[Outpu
 
 /// Refuses options of a graph for a timeline of topics, and that for outputs that are no pictures.
 pub(super) fn check_topics(given: &Given, outputs: &[Output]) -> Result<()> {
-    if !outputs
-        .iter()
-        .any(|output| output.format.takes("style", false))
-    {
+    let mut formats = outputs.iter().map(|output| output.format);
+    if !formats.any(|format| format.takes("style", false)) {
         return given.refuse(
             "mode",
             "`topics` is a picture, and no output is one",
@@ -143,15 +142,6 @@ pub(super) fn check_inputs(given: &Given, reading: &Reading) -> Result<()> {
         return given.refuse(OF_BAGS, &what, "give the bag itself");
     }
     Ok(())
-}
-
-/// Refuses options of `diff` that do not apply if one of the two is an expectation.
-pub(super) fn check_against(given: &Given) -> Result<()> {
-    given.refuse(
-        "rate-change",
-        "has no effect when a mission is compared with an expectations file",
-        "give two missions, or omit it",
-    )
 }
 
 /// Refuses to check against inferred nodes.

@@ -2,6 +2,8 @@
 
 use std::ffi::OsString;
 use std::path::PathBuf;
+use std::thread;
+use std::time::Duration;
 
 use clap::Args;
 
@@ -44,6 +46,8 @@ pub(super) struct FollowArgs {
 pub(super) const HELP: &str = "Nothing is written to the recording, and a database is never locked. A line is marked `(so far)` until it is certain.\n\n\
     Exit codes: 0 done, 1 failed or a rule is broken, 2 usage error, 3 done but data was skipped (damaged bag).";
 
+/// The time between two looks at the recording.
+const PAUSE: Duration = Duration::from_millis(200);
 /// The number of newest messages in which events are detected: less than a tenth of a second of work, and
 /// several minutes for most robots.
 const MOST: u64 = 500_000;
@@ -63,6 +67,7 @@ const KEPT: Period = match Period::from_nanos(3_600_000_000_000) {
 const SETTLED: f64 = 0.5;
 
 /// A recurring task, and the next time at which it may run.
+#[derive(Default)]
 struct Pace {
     due: f64,
     /// The time at which it may run if something new appeared.
@@ -79,20 +84,12 @@ impl Pace {
         self.due_new = now + ((now - begun) * REST / 4.0).max(LEAST_NEW);
         done
     }
-
-    fn new() -> Self {
-        Self {
-            due: 0.0,
-            due_new: 0.0,
-        }
-    }
 }
 
 /// The state of a followed recording and its outputs.
 struct Follower<'a> {
     args: &'a FollowArgs,
     follow: Follow,
-    format: LogFormat,
     feed: Feed,
     findings: Option<FindingFeed>,
     job: Render,
@@ -122,12 +119,11 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
     let follower = Follower {
         args,
         follow,
-        format: args.format,
         feed: Feed::default(),
         findings,
         job,
-        events: Pace::new(),
-        checks: Pace::new(),
+        events: Pace::default(),
+        checks: Pace::default(),
         is_silent: true,
     };
     follower.run(terminal)
@@ -137,11 +133,8 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
 fn begun(args: &FollowArgs, reading: &Reading, terminal: &Terminal) -> Result<Option<Follow>> {
     let idle = args.idle.map(|idle| idle.nanos() as f64 / 1e9);
     let begun = terminal.seconds();
-    let is_absent = || {
-        args.what
-            .metadata()
-            .map_or(true, |at| at.is_file() && at.len() == 0)
-    };
+    let is_empty = |at: std::fs::Metadata| at.is_file() && at.len() == 0;
+    let is_absent = || args.what.metadata().map_or(true, is_empty);
     let is_waiting = || idle.is_none_or(|idle| terminal.seconds() - begun < idle) && is_absent();
     if is_waiting() {
         terminal.note(&format!("waiting for `{}`", args.what.display()));
@@ -151,7 +144,7 @@ fn begun(args: &FollowArgs, reading: &Reading, terminal: &Terminal) -> Result<Op
         if terminal.take_signal() {
             return Ok(None);
         }
-        terminal.wait();
+        thread::sleep(PAUSE);
     }
     terminal.note_signals(false);
     Follow::new(reading.clone(), KEPT).map(Some)
@@ -198,14 +191,14 @@ impl Follower<'_> {
             if is_over {
                 break growth == Growth::Ended || is_idle;
             }
-            terminal.wait();
+            thread::sleep(PAUSE);
         };
         self.end(is_complete, terminal)
     }
 
     /// Prints the new events; false if standard output was closed.
     fn print_events(&mut self, terminal: &mut Terminal) -> Result<bool> {
-        let (follow, feed, format) = (&self.follow, &mut self.feed, self.format);
+        let (follow, feed, format) = (&self.follow, &mut self.feed, self.args.format);
         let lines = self.events.spend(terminal, || {
             let known = follow.so_far(MOST, Length::All)?;
             Ok(known.map_or_else(Vec::new, |known| feed.new_lines(&known, format)))
@@ -221,7 +214,7 @@ impl Follower<'_> {
             return Ok(());
         };
         let length = findings.length();
-        let (follow, format) = (&self.follow, self.format);
+        let (follow, format) = (&self.follow, self.args.format);
         let lines = self.checks.spend(terminal, || {
             let known = follow.so_far(u64::MAX, length)?;
             Ok(known.map_or_else(Vec::new, |known| findings.new_lines(&known, format)))
@@ -253,7 +246,7 @@ impl Follower<'_> {
         let Some(expect) = &self.args.expect else {
             return Ok(done);
         };
-        let format = (self.format == LogFormat::Text).then_some(&FORMATS[0]);
+        let format = (self.args.format == LogFormat::Text).then_some(&FORMATS[0]);
         gate::judge_closed(job.reading, &self.args.what, expect, format, terminal)
     }
 }

@@ -11,7 +11,7 @@ use super::render::summary;
 use super::terminal::Terminal;
 use super::values::{length, share};
 use super::{DONE, FAILED, SKIPPED, USAGE, code};
-use crate::base::error::{Error, Result};
+use crate::base::error::Result;
 use crate::base::notice::Notices;
 use crate::base::words;
 use crate::export::target::Target;
@@ -119,8 +119,8 @@ pub(super) const CHECK_HELP: &str = "Exit codes: 0 passed, 1 failed, 2 not check
 
 fn check_format(word: &str) -> Result<&'static ReportFormat, String> {
     ReportFormat::from_word(word).ok_or_else(|| {
-        let words: Vec<&str> = FORMATS.iter().map(|f| f.word).collect();
-        format!("write one of {}", words.join(", "))
+        let all = FORMATS.iter().map(|format| format.word);
+        format!("write one of {}", words::joined(all, ", "))
     })
 }
 
@@ -132,30 +132,24 @@ fn diff_format(word: &str) -> Result<&'static ReportFormat, String> {
 /// The formats, for the end of `check --help`.
 pub(super) fn check_help() -> String {
     let rows = FORMATS.iter().map(|f| {
-        let ends = f
-            .endings
-            .first()
-            .map_or_else(String::new, |e| format!(" ({e})"));
-        format!("  {:<9} {}{ends}", f.word, f.what)
+        let end = f.endings.first();
+        let end = end.map_or_else(String::new, |end| format!(" ({end})"));
+        format!("  {:<9} {}{end}", f.word, f.what)
     });
-    let rows: Vec<String> = rows.collect();
-    format!("Formats:\n{}\n\n{CHECK_HELP}", rows.join("\n"))
+    format!("Formats:\n{}\n\n{CHECK_HELP}", words::joined(rows, "\n"))
 }
 
 /// Prints the differences between two missions, or between one and an expectation.
 pub(super) fn diff(args: &DiffArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     let paths = [&args.first, &args.second];
     if let Some(at) = paths.iter().position(|path| is_expectation(path)) {
-        applies::check_against(given)?;
+        // The file has ranges of its own.
+        let what = "has no effect when a mission is compared with an expectations file";
+        given.refuse("rate-change", what, "give two missions, or omit it")?;
         return against(args, given, (paths[1 - at], paths[at]), terminal);
     }
-    let one = |path: &PathBuf| {
-        judged(
-            std::slice::from_ref(path),
-            args.range,
-            &GraphArgs::default(),
-        )
-    };
+    let graph = GraphArgs::default();
+    let one = |path| judged(std::slice::from_ref(path), args.range, &graph);
     let mut job = Diff::new([one(&args.first)?, one(&args.second)?])?;
     job.rate_change = args.rate_change;
     for output in &args.outputs {
@@ -165,11 +159,8 @@ pub(super) fn diff(args: &DiffArgs, given: &Given, terminal: &mut Terminal) -> R
         applies::check_inputs(given, reading)?;
     }
     let done = pipeline::diff(&job, terminal)?;
-    print(
-        &job.report(&done.differences, args.format),
-        args.format.word,
-        terminal,
-    )?;
+    let report = job.report(&done.differences, args.format);
+    print(&report, args.format.word, terminal)?;
     for remark in &done.remarks {
         terminal.note(remark);
     }
@@ -213,9 +204,8 @@ pub(super) fn wrote<'a>(
 
 /// Whether a path names an expectation.
 fn is_expectation(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|end| end == "yaml" || end == "yml")
-        && path.is_file()
+    let end = path.extension();
+    end.is_some_and(|end| end == "yaml" || end == "yml") && path.is_file()
 }
 
 /// Prints the difference between a mission and an expectation: the findings of a check.
@@ -268,15 +258,11 @@ pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Termin
         ));
     }
     if let Some(path) = &args.update {
-        let left = match done.left {
-            0 => String::new(),
-            n => {
-                let left = words::count(n, "finding");
-                format!("; {left} of rules left, which only you can resolve")
-            }
-        };
-        let changed = words::count(done.changed, "fact");
-        terminal.status(&format!("{}: {changed} updated{left}", path.display()));
+        let (path, changed) = (path.display(), words::count(done.changed, "fact"));
+        let left = words::count(done.left, "finding");
+        let left = format!("; {left} of rules left, which only you can resolve");
+        let left = Some(left).filter(|_| done.left > 0).unwrap_or_default();
+        terminal.status(&format!("{path}: {changed} updated{left}"));
     } else {
         let counts = [(done.nodes, "node"), (done.topics, "topic")];
         let what = counts.map(|(count, word)| words::count(count, word));
@@ -293,13 +279,9 @@ pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) ->
         terminal.results(&explain(word, width)?)?;
         return Ok(DONE);
     }
-    let Some(expect) = args.expect.clone() else {
-        return Err(Error::usage(
-            "`--expect` is missing",
-            "give the path of a graph.yaml",
-        ));
-    };
-    let mut job = Check::new(judged(&args.bags, args.range, &args.graph)?, &expect);
+    // Given, unless a kind is explained.
+    let expect = args.expect.clone().unwrap_or_default();
+    let mut job = Check::new(judged(&args.bags, args.range, &args.graph)?, expect);
     track(&mut job);
     let reports = args.outputs.iter().map(|output| report(output));
     job.reports = reports.collect::<Result<_>>()?;
@@ -334,10 +316,8 @@ fn verdict(job: &Check, format: Option<&ReportFormat>, terminal: &mut Terminal) 
     let verdict = &done.verdict;
     let findings = verdict.findings().len();
     if findings == 0 && verdict.facts(Judgement::Kept) == 0 {
-        terminal.note(&format!(
-            "`{}` contains no rule that applies",
-            job.expect.display()
-        ));
+        let file = job.expect.display();
+        terminal.note(&format!("`{file}` contains no rule that applies"));
     }
     let what = words::count(findings, "finding");
     let targets = job.reports.iter().map(|report| &report.target);
@@ -378,11 +358,9 @@ fn judged(bags: &[PathBuf], range: RangeArgs, graph: &GraphArgs) -> Result<Readi
 /// A report to write; Markdown if it is a CI job's summary file, which has no extension.
 fn report(output: &OsStr) -> Result<Report> {
     let is_summary = summary().is_some_and(|path| path == Path::new(output));
+    let target = Target::parse(output);
     match ReportFormat::from_word("markdown").filter(|_| is_summary) {
-        Some(format) => Ok(Report {
-            target: Target::parse(output),
-            format,
-        }),
+        Some(format) => Ok(Report { target, format }),
         None => Report::parse(output),
     }
 }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::base::error::{Error, Result};
 use crate::base::nearest::suggestion;
+use crate::base::words;
 use crate::cli::DONE;
 use crate::cli::Typed;
 use crate::cli::terminal::Terminal;
@@ -11,10 +12,10 @@ use crate::draw::style::{BUILTIN, builtin_text};
 
 /// Prints the built-in style `name`, or the names of all.
 pub(super) fn styles(name: Option<&str>, terminal: &mut Terminal) -> Result<u8> {
-    let names = BUILTIN.iter().map(|row| row.0).collect::<Vec<_>>();
+    let names = words::joined(BUILTIN.iter().map(|row| row.0), "\n");
     match name {
         Some(name) => terminal.results(builtin_text(name)?)?,
-        None => terminal.results(&(names.join("\n") + "\n"))?,
+        None => terminal.results(&(names + "\n"))?,
     }
     Ok(DONE)
 }
@@ -35,14 +36,9 @@ pub(super) fn manual(name: Option<&str>, terminal: &mut Terminal) -> Result<u8> 
     command.build();
     if let Some(name) = name {
         command = command.find_subcommand(name).cloned().ok_or_else(|| {
-            let known = command.get_subcommands().map(clap::Command::get_name);
-            let known: Vec<&str> = known.collect();
-            let near = suggestion(name, known.iter().copied());
-            let all = known.join(", ");
-            Error::usage(
-                format!("no command `{name}`{near}"),
-                format!("commands: {all}"),
-            )
+            let known = || command.get_subcommands().map(clap::Command::get_name);
+            let what = format!("no command `{name}`{}", suggestion(name, known()));
+            Error::usage(what, format!("commands: {}", words::joined(known(), ", ")))
         })?;
     }
     let mut page = Vec::new();

@@ -157,11 +157,12 @@ const OUTPUT: &str = "Output file; the extension selects the format, `{n}` write
 
 /// The table of formats, for the end of `render --help`.
 pub(super) fn outputs_help() -> String {
-    let rows = FORMATS
-        .iter()
-        .map(|f| format!("  .{:<6} {}", f.word, f.what));
-    let rows: Vec<String> = rows.collect();
-    shown(&format!("Outputs, by extension:\n{}", rows.join("\n")))
+    let rows = FORMATS.iter();
+    let rows = rows.map(|f| format!("  .{:<6} {}", f.word, f.what));
+    shown(&format!(
+        "Outputs, by extension:\n{}",
+        words::joined(rows, "\n")
+    ))
 }
 
 /// A help text that shows `{n}` literally: clap would replace it by a line break, so an escape sequence that has no effect

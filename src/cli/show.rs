@@ -207,14 +207,7 @@ pub(super) fn events(args: &EventsArgs, given: &Given, terminal: &mut Terminal) 
             for bag in each(folder, &reading, terminal)? {
                 match bag.mission {
                     Ok(mission) => logs.add(Some(&bag.name), &mission),
-                    Err(unread) => {
-                        let kind = if unread.is_loss {
-                            NoticeKind::Damaged
-                        } else {
-                            NoticeKind::Note
-                        };
-                        logs.notices.add(Notice::new(kind, unread.why));
-                    }
+                    Err(unread) => logs.notices.add(unread),
                 }
             }
         }

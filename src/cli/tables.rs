@@ -152,13 +152,10 @@ fn summary(done: &Tabled) -> String {
         (done.damaged, "damaged"),
         (done.kept, "already there"),
     ];
-    let of = of.iter().filter(|(count, _)| *count > 0);
-    let of: Vec<String> = of.map(|(count, what)| format!("{count} {what}")).collect();
     let tables = words::count(done.files, "table");
     let messages = words::count(done.messages, "message");
-    if of.is_empty() {
-        format!("{tables} of {messages}")
-    } else {
-        format!("{tables} of {messages} ({})", of.join(", "))
+    match words::counted(&of, |count, what| format!("{count} {what}")) {
+        none if none.is_empty() => format!("{tables} of {messages}"),
+        some => format!("{tables} of {messages} ({some})"),
     }
 }

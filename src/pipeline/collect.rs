@@ -79,15 +79,10 @@ fn once(
     let cut = reading.division.start.is_some() || reading.division.end.is_some();
     // If time goes back, a part of the mission is not a range of times: such a part is cut out once all is read.
     let is_range = cut && readers.iter().all(|reader| reader.is_straight());
-    let known = if is_range {
-        known_span(&mut readers)?
-    } else {
-        None
-    };
-    let known = known.filter(|span| clock::is_sure(*span));
-    let range = known
-        .map(|span| window::range(&reading.division, span))
-        .transpose()?;
+    let known = is_range.then(|| known_span(&mut readers)).transpose()?;
+    let known = known.flatten().filter(|span| clock::is_sure(*span));
+    let range = known.map(|span| window::range(&reading.division, span));
+    let range = range.transpose()?;
     let spaces: Vec<String> = inputs.iter().map(|i| space_of(reading, i)).collect();
     let mut pass = |seams: &[Vec<Seam>], merged: &Copies| {
         let mut collector = Collector::new(affordable(reading));
@@ -217,16 +212,12 @@ pub(super) const NOTHING_RECORDED: &str = "the recording is empty";
 
 /// The error for bags without messages, including losses.
 pub(super) fn no_messages(inputs: &[Input], notices: &Notices) -> Error {
-    let lost: Vec<String> = notices
-        .iter()
-        .filter(|n| n.kind.is_loss())
-        .take(3)
-        .map(|n| format!("{} (×{})", n.text, n.count))
-        .collect();
+    let lost = notices.iter().filter(|n| n.kind.is_loss()).take(3);
+    let lost = lost.map(|n| format!("{} (×{})", n.text, n.count));
     let name = inputs.iter().map(Input::name).min().unwrap_or_default();
-    let hint = match &lost[..] {
-        [] => NOTHING_RECORDED.to_owned(),
-        lost => lost.join("; "),
+    let hint = match words::joined(lost, "; ") {
+        none if none.is_empty() => NOTHING_RECORDED.to_owned(),
+        lost => lost,
     };
     Error::no_messages(&name, hint)
 }

@@ -57,13 +57,11 @@ pub(super) fn draw(
         FigureKind::Steps => (of_steps(&sheet, drawing)?, Vec::new()),
     };
     let drawn = figure::finished(&source, options, scene, remarks);
-    let picture = outputs
-        .iter()
-        .find(|o| ["pdf", "png", "svg"].contains(&o.format.word))
-        .map_or_else(
-            || format!("{}.pdf", options.kind.word()).into(),
-            |output| output.target.path().to_owned(),
-        );
+    let is_included = |o: &&Output| ["pdf", "png", "svg"].contains(&o.format.word);
+    let picture = match outputs.iter().find(is_included) {
+        Some(output) => output.target.path().to_owned(),
+        None => format!("{}.pdf", options.kind.word()).into(),
+    };
     let is_special = |c: char| c.is_control() || "\\{}%#~^$&".contains(c);
     let name = picture.display().to_string();
     if name.contains(is_special) && outputs.iter().any(|o| o.format.word == "tex") {
@@ -130,13 +128,10 @@ fn of_graph(
             },
         ));
     }
-    let folded = composed.options.collapse.iter();
-    let folded: Vec<&str> = folded.map(|name| &**name).collect();
-    let remark = || {
-        let names = words::some_of(&folded, MOST_NAMED);
-        format!("not all nodes fit, so that each of these namespaces is one box: {names}")
-    };
-    let remarks = (!folded.is_empty()).then(remark).into_iter().collect();
+    let folded = &composed.options.collapse;
+    let names = words::some_of(folded, MOST_NAMED);
+    let remark = format!("not all nodes fit, so that each of these namespaces is one box: {names}");
+    let remarks = (!folded.is_empty()).then_some(remark).into_iter().collect();
     let picture = composed.picture(&drawing).scene(0);
     Ok((figure::graph(sheet, picture), remarks))
 }
@@ -170,14 +165,11 @@ fn of_steps(sheet: &FigureSheet<'_>, drawing: &Drawing) -> Result<Scene> {
         .collect();
     let mut chosen = chosen(sheet, &all)?;
     let mm = sheet.options.width_mm;
-    let pictures: Vec<Option<(usize, Scene)>> = all
-        .iter()
-        .enumerate()
-        .map(|(at, (_, news))| {
-            let is_chosen = chosen.contains(&at);
-            is_chosen.then(|| narrowest(&drawing, news, mm)).flatten()
-        })
-        .collect();
+    let picture = |(at, (_, news)): (usize, &(usize, News))| {
+        let is_chosen = chosen.contains(&at);
+        is_chosen.then(|| narrowest(&drawing, news, mm)).flatten()
+    };
+    let pictures: Vec<Option<(usize, Scene)>> = all.iter().enumerate().map(picture).collect();
     loop {
         let panels = chosen.iter().map(|at| {
             let (k, news) = &all[*at];
@@ -293,11 +285,8 @@ fn panel(
 ) -> StepPanel {
     let view = &news.view;
     let start = source.phases[k].span.start.since(source.span().start);
-    let ids: Vec<_> = view
-        .frames
-        .iter()
-        .flat_map(|frame| frame.headlines.iter().map(|h| h.event))
-        .collect();
+    let headlines = view.frames.iter().flat_map(|frame| &frame.headlines);
+    let ids: Vec<_> = headlines.map(|headline| headline.event).collect();
     let log = &source.mission.log.events;
     let handover = |id: &crate::mission::EventId| {
         let event = log.get(*id)?;
@@ -310,13 +299,8 @@ fn panel(
             Some(last_part(&node.role).to_owned())
         };
         let shown = source.shows(topic) && !source.is_hub(topic);
-        let text = format!(
-            "{}: {} → {}",
-            last_part(source.topic(topic)),
-            role(from)?,
-            role(to)?
-        );
-        shown.then_some(text)
+        let (name, from, to) = (last_part(source.topic(topic)), role(from)?, role(to)?);
+        shown.then(|| format!("{name}: {from} → {to}"))
     };
     let seen = view.seen(0);
     let changes = seen.items.iter().filter_map(|shown| {

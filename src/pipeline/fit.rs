@@ -61,22 +61,21 @@ pub(super) fn fitted(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watch
         ..drawing.clone()
     };
     let (asked, drawing) = (drawing, &plain);
-    let mut layouts = Layouts::default();
-    let (options, page) = (drawing.view.clone(), drawing.page.clone());
     let mut fitting = Fitting {
         mission,
         drawing,
-        best: Attempt::new(mission, drawing, options, page, &mut layouts),
-        layouts,
+        best: Attempt::default(),
+        layouts: Layouts::default(),
     };
+    fitting.best = fitting.attempt(drawing.view.clone(), drawing.page.clone());
     fitting.take_higher_page();
     if drawing.is_fitted && !fitting.is_readable() {
         fitting.make_readable();
     }
+    fitting.drawing = asked;
     if plain.style != asked.style {
         fitting.draw_again(asked);
     }
-    fitting.drawing = asked;
     let mut composed = fitting.composed();
     if !asked.is_sized && asked.is_fitted && asked.page.width_mm.is_none() {
         composed.page = cropped(&composed, asked);
@@ -104,8 +103,60 @@ impl Fitting<'_> {
         &self.best.composed.page
     }
 
+    /// An attempt, with a layout if it may be legible or `--fit none` was given.
     fn attempt(&mut self, options: ViewOptions, page: PageOptions) -> Attempt {
-        Attempt::new(self.mission, self.drawing, options, page, &mut self.layouts)
+        let (mission, drawing) = (self.mission, self.drawing);
+        let boxes = mission.elements.nodes.len() + mission.elements.topics.len();
+        if drawing.is_fitted && is_crowded(boxes, drawing, &page) {
+            let composed = Composed::outline(mission, options.clone(), page.clone());
+            if is_crowded(composed.view.items.len(), drawing, &page) {
+                return Attempt {
+                    composed,
+                    ..Attempt::default()
+                };
+            }
+        }
+        self.laid_out(drawing, options, page)
+    }
+
+    /// An attempt with a layout in any case.
+    fn laid_out(&mut self, drawing: &Drawing, options: ViewOptions, page: PageOptions) -> Attempt {
+        // The widest labels depend on rates, so the windows are needed too.
+        let mut composed = Composed::new(self.mission, options, page);
+        let measured = composed.measured(drawing);
+        let readable = drawing.readable();
+        let plan = measured.plan();
+        let least = readable / measured.smallest_text();
+        let page = LayoutOptions {
+            least: if drawing.is_fitted {
+                ALMOST * least
+            } else {
+                0.0
+            },
+            ..measured.layout_options()
+        };
+        let mut placed = |page: &LayoutOptions| {
+            let make = || drawing.laid_out(plan, page, Some(&composed.view));
+            let layout = self.layouts.of(plan, page, make);
+            (measured.text_px(&layout), layout)
+        };
+        let (mut text, mut layout) = placed(&page);
+        if drawing.is_fitted && (ALMOST * readable..readable).contains(&text) {
+            let tight = placed(&LayoutOptions {
+                is_tight: true,
+                least,
+                ..page
+            });
+            if tight.0 >= readable {
+                (text, layout) = tight;
+            }
+        }
+        composed.layout = layout;
+        Attempt {
+            composed,
+            is_laid_out: true,
+            text,
+        }
     }
 
     /// Takes these options on this page if everything is legible; returns whether it is.
@@ -126,7 +177,7 @@ impl Fitting<'_> {
     /// Takes what is shown so far as another drawing draws it, however small its text is.
     fn draw_again(&mut self, drawing: &Drawing) {
         let (options, page) = (self.options().clone(), self.page().clone());
-        self.best = Attempt::laid_out(self.mission, drawing, options, page, &mut self.layouts);
+        self.best = self.laid_out(drawing, options, page);
     }
 
     fn make_readable(&mut self) {
@@ -261,15 +312,12 @@ impl Fitting<'_> {
         let mut reported: BTreeSet<Element> = headlines(self.mission).collect();
         let topics = reported.iter();
         let topics: BTreeSet<_> = topics.filter_map(|what| elements.ends(*what).1).collect();
-        let edges = elements
-            .edges()
-            .filter(|(_, edge)| topics.contains(&edge.topic));
-        reported.extend(edges.map(|(_, edge)| Element::Node(edge.node)));
+        let edges = elements.edges().map(|(_, edge)| edge);
+        let edges = edges.filter(|edge| topics.contains(&edge.topic));
+        reported.extend(edges.map(|edge| Element::Node(edge.node)));
         let is_reported = |item: ItemId| {
-            view.items[item]
-                .members
-                .iter()
-                .any(|m| reported.contains(m))
+            let mut members = view.items[item].members.iter();
+            members.any(|member| reported.contains(member))
         };
         let lines = view.arrows.iter();
         let lines = lines.filter(|a| is_reported(a.from) != is_reported(a.to));
@@ -320,14 +368,10 @@ impl Fitting<'_> {
         let nodes = self.mission.elements.nodes.iter();
         let names: Vec<&str> = nodes.map(|node| node.name.as_str()).collect();
         let common = common_space(&names);
-        let outermost: BTreeSet<&str> = (names.iter().copied())
-            .filter_map(|name| outermost(name, common))
-            .collect();
-        let is_open = |space: &&str| bundled.expand.iter().any(|open| &**open == *space);
-        let outermost: Vec<&str> = outermost.into_iter().filter(|s| !is_open(s)).collect();
-        bundled
-            .collapse
-            .extend(outermost.into_iter().map(Arc::from));
+        let spaces = names.iter().filter_map(|name| outermost(name, common));
+        let mut spaces: BTreeSet<Arc<str>> = spaces.map(Arc::from).collect();
+        spaces.retain(|space| !bundled.expand.contains(space));
+        bundled.collapse.extend(spaces);
         let attempt = self.attempt(bundled, self.page().clone());
         if attempt.text > self.best.text && attempt.composed.view.items.len() > 1 {
             self.best = attempt;
@@ -425,6 +469,7 @@ impl Layouts {
 }
 
 /// What some options show on a page.
+#[derive(Default)]
 struct Attempt {
     composed: Composed,
     /// Whether it is laid out; not if there are too many boxes for any legible layout.
@@ -434,75 +479,6 @@ struct Attempt {
 }
 
 impl Attempt {
-    /// An attempt, with a layout if it may be legible or `--fit none` was given.
-    fn new(
-        mission: &Mission,
-        drawing: &Drawing,
-        options: ViewOptions,
-        page: PageOptions,
-        layouts: &mut Layouts,
-    ) -> Self {
-        let elements = &mission.elements;
-        let boxes = elements.nodes.len() + elements.topics.len();
-        if drawing.is_fitted && is_crowded(boxes, drawing, &page) {
-            let composed = Composed::outline(mission, options.clone(), page.clone());
-            if is_crowded(composed.view.items.len(), drawing, &page) {
-                return Self {
-                    composed,
-                    is_laid_out: false,
-                    text: 0.0,
-                };
-            }
-        }
-        Self::laid_out(mission, drawing, options, page, layouts)
-    }
-
-    /// An attempt with a layout in any case.
-    fn laid_out(
-        mission: &Mission,
-        drawing: &Drawing,
-        options: ViewOptions,
-        page: PageOptions,
-        layouts: &mut Layouts,
-    ) -> Self {
-        // The widest labels depend on rates, so the windows are needed too.
-        let mut composed = Composed::new(mission, options, page);
-        let measured = composed.measured(drawing);
-        let readable = drawing.readable();
-        let plan = measured.plan();
-        let least = readable / measured.smallest_text();
-        let page = LayoutOptions {
-            least: if drawing.is_fitted {
-                ALMOST * least
-            } else {
-                0.0
-            },
-            ..measured.layout_options()
-        };
-        let mut placed = |page: &LayoutOptions| {
-            let make = || drawing.laid_out(plan, page, Some(&composed.view));
-            let layout = layouts.of(plan, page, make);
-            (measured.text_px(&layout), layout)
-        };
-        let (mut text, mut layout) = placed(&page);
-        if drawing.is_fitted && (ALMOST * readable..readable).contains(&text) {
-            let tight = placed(&LayoutOptions {
-                is_tight: true,
-                least,
-                ..page
-            });
-            if tight.0 >= readable {
-                (text, layout) = tight;
-            }
-        }
-        composed.layout = layout;
-        Self {
-            composed,
-            is_laid_out: true,
-            text,
-        }
-    }
-
     fn is_readable(&self, drawing: &Drawing) -> bool {
         self.text >= drawing.readable()
     }
@@ -548,26 +524,19 @@ fn lowered(composed: &Composed, drawing: &Drawing) -> PageOptions {
 fn cropped(composed: &Composed, drawing: &Drawing) -> PageOptions {
     let (view, page, natural) = (&composed.view, &composed.page, composed.layout.size);
     let largest = NAMES_PX / drawing.style.node.size;
-    let scale = composed
-        .measured(drawing)
-        .scale(&composed.layout)
-        .min(largest);
+    let measured = composed.measured(drawing);
+    let scale = measured.scale(&composed.layout).min(largest);
     let least = if view.has_time() { LEAST.0 } else { LEAST.1 };
-    let wide = (natural.w * scale + 2.0 * AROUND)
-        .max(least)
-        .min(page.size.w);
+    let wide = (natural.w * scale + 2.0 * AROUND).max(least);
+    let wide = wide.min(page.size.w);
     let mut cropped = PageOptions {
         size: Size::new(wide, page.size.h),
         unit: Some((wide / DECORATIONS.0).clamp(DECORATIONS.1, 1.0)),
         has_legend: page.has_legend && wide >= LEGEND,
         ..page.clone()
     };
-    let decorations = page.size.h
-        - drawing
-            .measured(view, cropped.clone())
-            .layout_options()
-            .page
-            .h;
+    let measured = drawing.measured(view, cropped.clone());
+    let decorations = page.size.h - measured.layout_options().page.h;
     let high = decorations + natural.h * scale + 1.2 * AROUND;
     cropped.size = Size::new(libm::ceil(wide), libm::ceil(high.max(LEAST.2)));
     if cropped.size.h < page.size.h {
@@ -609,11 +578,10 @@ fn reported(
         notices.add(Notice::new(NoticeKind::Chosen, text));
     }
     if let Some((first, _)) = collapsed.first() {
-        let collapsed: Vec<&String> = collapsed.iter().map(|(_, words)| words).collect();
         let text = format!(
             "drew namespaces as one box each{}: {}; keep one open with `--collapse -{first}`, all with `--fit none`",
             so_that(is_readable),
-            words::some_of(&collapsed, 3)
+            words::some_of(collapsed.iter().map(|(_, words)| words), 3)
         );
         notices.add(Notice::new(NoticeKind::Hidden, text));
     }

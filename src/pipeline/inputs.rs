@@ -21,25 +21,20 @@ pub(super) fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
             Input::Stdin => PathBuf::from("-"),
         };
         let first = seen.entry(real).or_insert_with(|| input.clone());
-        if !once.contains(first) {
-            once.push(input);
-        } else if input.is_pipe() {
-            let what = format!(
-                "{} was given twice, but can be read only once",
-                input.name()
-            );
-            return Err(Error::usage(what, "give it once"));
-        } else {
-            let text = if first.name() == input.name() {
-                format!("`{}` was given twice and read once", input.name())
+        if once.contains(first) {
+            let (known, name) = (first.name(), input.name());
+            if input.is_pipe() {
+                let what = format!("{name} was given twice, but can be read only once");
+                return Err(Error::usage(what, "give it once"));
+            }
+            let text = if known == name {
+                format!("`{name}` was given twice and read once")
             } else {
-                let names = [first.name(), input.name()];
-                format!(
-                    "`{}` and `{}` are copies of one recording, which was read once",
-                    names[0], names[1]
-                )
+                format!("`{known}` and `{name}` are copies of one recording, which was read once")
             };
             twice.push(Notice::new(NoticeKind::Note, text));
+        } else {
+            once.push(input);
         }
     }
     // The order in which they are given does not matter.
@@ -105,21 +100,20 @@ pub(super) fn check_named(reading: &Reading, inputs: &[Input]) -> Result<()> {
     let is_used = |name: &Path| inputs.iter().any(|input| is_of(name, input));
     match offsets.chain(spaces).find(|(name, ..)| !is_used(name)) {
         None => Ok(()),
-        Some((name, option, value)) => Err(Error::usage(
-            format!(
-                "`--{option}` names `{}`, which is not among the bags",
-                name.display()
-            ),
-            format!("write the bag as on the command line: `--{option} run_2.bag={value}`"),
-        )),
+        Some((name, option, value)) => {
+            let name = name.display();
+            Err(Error::usage(
+                format!("`--{option}` names `{name}`, which is not among the bags"),
+                format!("write the bag as on the command line: `--{option} run_2.bag={value}`"),
+            ))
+        }
     }
 }
 
 /// Refuses bags with the same messages, which would be counted twice: copies and conversions. Pipes are not checked.
 fn refuse_copies(inputs: &[Input]) -> Result<()> {
-    let near = inputs
-        .iter()
-        .filter(|i| matches!(i, Input::Path(_)) && !i.is_pipe());
+    let near = inputs.iter();
+    let near = near.filter(|i| matches!(i, Input::Path(_)) && !i.is_pipe());
     let near: Vec<&Input> = near.collect();
     // Errors of opening are reported when the bag is read.
     let open = |input: &Input| bag::open(input, &OpenOptions::default()).ok();

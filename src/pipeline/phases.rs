@@ -104,24 +104,18 @@ type PhaseLine = (Option<i64>, String);
 
 fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
     let hint = "write a phase per line: `0:38 navigation`, or only names for the detected phases";
-    let bad = |line: usize, reason: String| Error::bad_file(path, line, reason, hint);
+    let bad = |line: usize, reason: &str| Error::bad_file(path, line, reason, hint);
     let all = text.lines().enumerate().map(|(n, l)| (n + 1, l.trim()));
     let all = all.filter(|(_, l)| !l.is_empty() && !l.starts_with('#'));
     let lines: Vec<(usize, PhaseLine)> = all.map(|(n, l)| (n, line(l))).collect();
     let timed = lines.iter().filter(|(_, (at, _))| at.is_some()).count();
     if let Some((n, _)) = lines.iter().find(|(_, (at, _))| timed > 0 && at.is_none()) {
-        return Err(bad(
-            *n,
-            "this line has no start time, but other lines do".to_owned(),
-        ));
+        return Err(bad(*n, "this line has no start time, but other lines do"));
     }
     if timed > 0 {
         let disordered = lines.windows(2).find(|pair| pair[0].1.0 >= pair[1].1.0);
         if let Some(pair) = disordered {
-            return Err(bad(
-                pair[1].0,
-                "it does not begin after the previous one".to_owned(),
-            ));
+            return Err(bad(pair[1].0, "it does not begin after the previous one"));
         }
         // The time before the first phase belongs to it.
         let start = basis.whole.start;
@@ -136,7 +130,7 @@ fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
     if let Some((n, _)) = lines.get(many) {
         return Err(bad(
             *n,
-            format!("there are more names than phases ({many})"),
+            &format!("there are more names than phases ({many})"),
         ));
     }
     for (phase, (_, (_, name))) in found.iter_mut().zip(lines) {

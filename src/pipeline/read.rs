@@ -330,12 +330,11 @@ fn in_order(bags: &mut Vec<Report>, recorded: &Recorded) {
 /// The notice about nodes that appear in several recordings at the same time.
 fn doubled(history: &History) -> Option<Notice> {
     let name = |id: &NodeId| format!("`{}`", history.elements.nodes[*id].name);
-    let names: Vec<String> = history.doubled.iter().map(name).collect();
     let text = format!(
         "several recordings contain messages of the same nodes at the same time, so restarts of these nodes are unknown: {}; put the names of one bag in a namespace with `--ns BAG=/robot2`",
-        words::some_of(&names, NAMED)
+        words::some_of(history.doubled.iter().map(name), NAMED)
     );
-    (!names.is_empty()).then(|| Notice::new(NoticeKind::Note, text))
+    (!history.doubled.is_empty()).then(|| Notice::new(NoticeKind::Note, text))
 }
 
 /// The most nodes named in a notice.

@@ -7,6 +7,7 @@ use super::collect::NOTHING_RECORDED;
 use super::{Reading, Watch, read};
 use crate::bag::{self, Input, Recording};
 use crate::base::error::{Error, Fault, Result};
+use crate::base::notice::{Notice, NoticeKind};
 use crate::export::tables::{self, TableFormat};
 use crate::mission::Mission;
 use crate::mission::info::{SurveyRow, survey_table};
@@ -52,8 +53,8 @@ fn row(one: FolderBag) -> SurveyRow {
         Err(unread) => SurveyRow {
             path: one.name,
             file_bytes: one.file_bytes,
-            is_complete: !unread.is_loss,
-            error: Some(unread.why),
+            is_complete: !unread.kind.is_loss(),
+            error: Some(unread.text),
             ..SurveyRow::default()
         },
     }
@@ -65,14 +66,8 @@ pub(crate) struct FolderBag {
     pub(crate) name: String,
     /// Its size in bytes, if known.
     file_bytes: Option<u64>,
-    pub(crate) mission: std::result::Result<Mission, Unread>,
-}
-
-/// Why there is no mission of a recording.
-pub(crate) struct Unread {
-    pub(crate) why: String,
-    /// Whether data is lost; an empty bag may be intact.
-    pub(crate) is_loss: bool,
+    /// The mission, or why there is none.
+    pub(crate) mission: Result<Mission, Notice>,
 }
 
 /// Every recording below `folder`, sorted by path, each read when its turn comes.
@@ -100,16 +95,16 @@ pub(crate) fn each<'a>(
     }))
 }
 
-fn unread(error: Error) -> Unread {
+/// Why there is no mission of a recording. Data is lost, but an empty bag may be intact.
+fn unread(error: Error) -> Notice {
     match error {
-        Error::NoMessages(Fault { what, hint }) => Unread {
-            is_loss: hint != NOTHING_RECORDED,
-            why: format!("{what}: {hint}"),
-        },
-        error => Unread {
-            is_loss: true,
-            why: error.to_string(),
-        },
+        Error::NoMessages(Fault { what, hint }) if hint == NOTHING_RECORDED => {
+            Notice::new(NoticeKind::Note, format!("{what}: {hint}"))
+        }
+        Error::NoMessages(Fault { what, hint }) => {
+            Notice::new(NoticeKind::Damaged, format!("{what}: {hint}"))
+        }
+        error => Notice::new(NoticeKind::Damaged, error.to_string()),
     }
 }
 
@@ -126,15 +121,10 @@ pub(super) fn alone<T>(bag: &str, read: impl FnOnce() -> Result<T>) -> Result<T>
 pub(super) fn recordings(folder: &Path) -> Result<Vec<Recording>> {
     let bags = bag::recordings(folder)?;
     if bags.is_empty() {
-        return Err(no_bags(folder));
+        let hint = "give a bag, a rosbag2 folder, or a folder with bags below it";
+        return Err(Error::unknown_bag(folder, "a folder without bags", hint));
     }
     Ok(bags)
-}
-
-/// The error of a folder without bags.
-pub(super) fn no_bags(folder: &Path) -> Error {
-    let hint = "give a bag, a rosbag2 folder, or a folder with bags below it";
-    Error::unknown_bag(folder, "a folder without bags", hint)
 }
 
 #[cfg(test)]

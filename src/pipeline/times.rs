@@ -154,10 +154,6 @@ impl Sink for OfBag<'_, '_> {
 /// The notice about losses of a bag that reported none.
 pub(super) fn of_report(report: &Report, notices: &Notices) -> Option<Notice> {
     let silent = !report.complete && !notices.any_loss();
-    silent.then(|| {
-        Notice::new(
-            NoticeKind::Damaged,
-            format!("`{}` is not complete", report.name),
-        )
-    })
+    let text = format!("`{}` is not complete", report.name);
+    silent.then(|| Notice::new(NoticeKind::Damaged, text))
 }

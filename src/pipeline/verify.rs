@@ -29,25 +29,22 @@ pub(super) fn verify(
     watch.stage(Stage::Verify);
     let second = collect(&mut reading.clone(), true, watch);
     match second.and_then(|second| compare(first, &second, reading)) {
-        Err(Error::Interrupted) => Err(Error::Interrupted),
-        Err(why) => Ok(Verified {
-            reports: first.reports.clone(),
-            notices: vec![Notice::new(
-                NoticeKind::Damaged,
-                format!("the bag could not be verified: {why}"),
-            )],
-        }),
-        Ok(verified) => Ok(verified),
+        Err(why) if !matches!(why, Error::Interrupted) => {
+            let text = format!("the bag could not be verified: {why}");
+            Ok(Verified {
+                reports: first.reports.clone(),
+                notices: vec![Notice::new(NoticeKind::Damaged, text)],
+            })
+        }
+        other => other,
     }
 }
 
 /// The notices about differing counts, and about bags that could not be verified.
 fn compare(first: &Collected, second: &Collected, reading: &Reading) -> Result<Verified> {
     let windows = divide(&reading.division, first.range)?;
-    let (ours, theirs) = (
-        counted(first, &windows.spans)?,
-        counted(second, &windows.spans)?,
-    );
+    let ours = counted(first, &windows.spans)?;
+    let theirs = counted(second, &windows.spans)?;
     let differing = ours.symmetric_difference(&theirs).count();
     let messages = |all: &BTreeSet<TopicCount>| all.iter().map(|c| c.count).sum::<u64>();
     let (messages, theirs) = (messages(&ours), messages(&theirs));
@@ -59,17 +56,13 @@ fn compare(first: &Collected, second: &Collected, reading: &Reading) -> Result<V
         "reading"
     };
     notices.push(if same {
-        Notice::new(
-            NoticeKind::Note,
-            format!("a second {reader} counts the same {messages} messages"),
-        )
+        let text = format!("a second {reader} counts the same {messages} messages");
+        Notice::new(NoticeKind::Note, text)
     } else {
-        Notice::new(
-            NoticeKind::Damaged,
-            format!(
-                "a second reader counts {theirs} messages instead of {messages}; {differing} counts of topics in windows differ"
-            ),
-        )
+        let text = format!(
+            "a second reader counts {theirs} messages instead of {messages}; {differing} counts of topics in windows differ"
+        );
+        Notice::new(NoticeKind::Damaged, text)
     });
     let lost = second.recorded.notices.iter().filter(|n| n.kind.is_loss());
     notices.extend(lost);

@@ -47,6 +47,7 @@ fn msg_files(folder: &Path) -> Result<Vec<(String, PathBuf)>> {
         Ok(below) => folder.join(below),
         Err(_) => path,
     };
+    let is_definition = |end: &OsStr| KINDS.iter().any(|kind| end == *kind);
     let (mut waiting, mut found) = (vec![whole.clone()], Vec::new());
     while let Some(folder) = waiting.pop() {
         let entries = fs::read_dir(&folder).map_err(Error::io("read", &folder))?;
@@ -55,11 +56,7 @@ fn msg_files(folder: &Path) -> Result<Vec<(String, PathBuf)>> {
             let (path, kind) = (entry.path(), entry.file_type());
             if kind.is_ok_and(|kind| kind.is_dir()) {
                 waiting.push(path);
-            } else if path.is_file()
-                && path
-                    .extension()
-                    .is_some_and(|end| KINDS.iter().any(|kind| end == *kind))
-            {
+            } else if path.is_file() && path.extension().is_some_and(is_definition) {
                 let is_kind = KINDS.iter().any(|kind| folder.ends_with(kind));
                 let outer = folder.parent().filter(|_| is_kind);
                 let name = |path: Option<&OsStr>| path.map(|n| n.to_string_lossy().into_owned());
@@ -69,11 +66,9 @@ fn msg_files(folder: &Path) -> Result<Vec<(String, PathBuf)>> {
             }
         }
         if waiting.len() + found.len() > MOST_FILES {
+            let folder = folder.display();
             return Err(Error::usage(
-                format!(
-                    "`{}` contains more than {MOST_FILES} files",
-                    folder.display()
-                ),
+                format!("`{folder}` contains more than {MOST_FILES} files"),
                 "give the folder of your message packages",
             ));
         }

@@ -92,7 +92,7 @@ fn nothing(job: &Extract, lost: &Lost) -> Error {
     }
     let types = lost.types.iter();
     let types = types.map(|(name, why)| format!("{name}: {why}"));
-    let types = words::some_of(&types.collect::<Vec<String>>(), MOST_NAMED);
+    let types = words::some_of(types, MOST_NAMED);
     let what = format!("no message could be decoded; {types}");
     let hint = "`--msg-path DIR` names a folder of `.msg`, `.srv`, `.action` or `.idl` files";
     Error::unsupported(name, what, hint)
@@ -238,11 +238,8 @@ impl FieldTables {
         if self.all[at].writer.is_none() {
             self.all[at].writer = Some(self.begin(at)?);
         }
-        let table = &mut self.all[at];
-        match &mut table.writer {
-            Some(writer) => writer.write(&table.batch),
-            None => Ok(()),
-        }
+        let FieldTable { writer, batch, .. } = &mut self.all[at];
+        writer.as_mut().map_or(Ok(()), |writer| writer.write(batch))
     }
 
     /// Begins the file of a table under a unique name.
@@ -257,13 +254,9 @@ impl FieldTables {
         }
         table.file = format!("{name}.{}", self.format.word());
         let part = self.folder.file(table.file.clone());
+        let part = BufWriter::with_capacity(1 << 16, part);
         let facts = [("topic", table.topic.as_str()), ("type", &table.type_name)];
-        begin(
-            self.format,
-            BufWriter::with_capacity(1 << 16, part),
-            &table.batch,
-            &facts,
-        )
+        begin(self.format, part, &table.batch, &facts)
     }
 
     /// Bounds the memory for encoded rows.
@@ -336,20 +329,14 @@ struct OfBag<'a> {
 impl OfBag<'_> {
     /// Counts announced messages that were not delivered.
     fn count_missing(&mut self) {
-        let mut reasons: BTreeMap<usize, &str> = BTreeMap::new();
-        for (at, source) in self.sources.iter().enumerate() {
-            match &source.tables {
-                Some(Err(why)) => reasons.insert(at, why),
-                Some(Ok(_)) => reasons.insert(at, "they could not be read"),
-                None => None,
+        for source in self.sources.iter().filter(|source| source.missing > 0) {
+            let why = match &source.tables {
+                Some(Err(why)) => why,
+                Some(Ok(_)) => "they could not be read",
+                None => continue,
             };
-        }
-        for (at, why) in reasons {
-            let source = &self.sources[at];
-            if source.missing > 0 {
-                self.lost
-                    .add(&source.topic, &source.type_name, source.missing, why);
-            }
+            let (topic, type_name) = (&source.topic, &source.type_name);
+            self.lost.add(topic, type_name, source.missing, why);
         }
     }
 }
