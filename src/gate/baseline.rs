@@ -128,18 +128,14 @@ impl Room {
     /// Reserves space for a line; returns whether it fits.
     fn takes(&mut self, line: &str) -> bool {
         // A pair is two values, and so is a mapping or list with its first member; a comma begins another.
-        let signs = line
-            .bytes()
-            .filter(|b| matches!(b, b':' | b',' | b'[' | b'{'));
-        let values = 2 * signs.count();
-        let (Some(bytes), Some(values)) = (
-            self.bytes.checked_sub(line.len()),
-            self.values.checked_sub(values),
-        ) else {
-            return false;
-        };
-        (self.bytes, self.values) = (bytes, values);
-        true
+        let is_sign = |b: &u8| matches!(b, b':' | b',' | b'[' | b'{');
+        let values = 2 * line.bytes().filter(is_sign).count();
+        let fits = line.len() <= self.bytes && values <= self.values;
+        if fits {
+            self.bytes -= line.len();
+            self.values -= values;
+        }
+        fits
     }
 }
 
@@ -159,9 +155,8 @@ struct Line {
 
 impl Line {
     fn of<const N: usize>(facts: [(&'static str, Option<String>); N]) -> Self {
-        let facts = facts
-            .into_iter()
-            .filter_map(|(key, value)| Some((key, value?)));
+        let facts = facts.into_iter();
+        let facts = facts.filter_map(|(key, value)| Some((key, value?)));
         Self {
             facts: facts.collect(),
             comment: String::new(),
@@ -283,11 +278,8 @@ impl Times {
     /// The time range for the start of an element that started at these times.
     fn within(&self, times: &[i64]) -> Option<String> {
         let (from, to) = self.wide(times).filter(|_| !self.is_part)?;
-        Some(format!(
-            "{}..{}",
-            from.unwrap_or_default(),
-            length(whole(to))
-        ))
+        let (from, to) = (from.unwrap_or_default(), length(whole(to)));
+        Some(format!("{from}..{to}"))
     }
 
     /// The time range for the end of an element that was silent for at most `tail` nanoseconds at the end.
@@ -332,7 +324,7 @@ fn topic(seen: &[TopicIn<'_>], times: &Times) -> Line {
     let hz = band(&rates.concat(), is_even, pause).filter(|_| is_rated);
     let is_latched = seen.iter().all(|s| s.facts.is_latched(s.id) == Some(true));
     // Messages sent once, on request or for late subscribers, have no times of their own.
-    let is_many = |s: &TopicIn<'_>| s.facts.messages(s.id) >= FEWEST_OF_MEAN;
+    let is_many = |s: &TopicIn<'_>| s.facts.messages[s.id] >= FEWEST_OF_MEAN;
     let is_timed = hz.is_some() || !is_latched && seen.iter().all(is_many);
     // An even topic stays; for others, the last message shows whether they do.
     let tails = received.map(|(s, own)| s.facts.mission.span.end.since(own.end));
@@ -408,7 +400,7 @@ fn extremes(rates: &[Rate]) -> (f64, f64) {
 /// The lowest and highest rates of a topic; if they are meaningless, the number of its messages.
 fn unjudged(seen: &[TopicIn<'_>], rates: &[Rate]) -> String {
     let (least, most) = extremes(rates);
-    let counts = seen.iter().map(|s| s.facts.messages(s.id));
+    let counts = seen.iter().map(|s| s.facts.messages[s.id]);
     let count = counts.max().unwrap_or(0);
     if count < FEWEST || rates.len() < 2 {
         return words::count(count, "message");
@@ -473,16 +465,16 @@ fn rounded(value: f64, round: fn(f64) -> f64) -> f64 {
 
 /// A length of time in the command line's syntax.
 fn length(nanos: i64) -> String {
-    if nanos % SECOND == 0 {
-        format!("{}s", nanos / SECOND)
-    } else {
-        format!("{}s", nanos as f64 / 1e9)
-    }
+    format!("{}s", nanos as f64 / 1e9)
 }
 
 /// The nanoseconds rounded up to a whole second.
 fn whole(nanos: i64) -> i64 {
-    nanos.saturating_add(SECOND - 1) / SECOND * SECOND
+    rounded_up(nanos, SECOND)
+}
+
+fn rounded_up(nanos: i64, step: i64) -> i64 {
+    nanos.saturating_add(step - 1) / step * step
 }
 
 /// The nanoseconds rounded up to two digits.
@@ -491,10 +483,7 @@ fn two_digits(nanos: i64) -> i64 {
     while nanos / step >= 100 {
         step *= 10;
     }
-    nanos
-        .div_euclid(step)
-        .saturating_add(i64::from(nanos % step > 0))
-        .saturating_mul(step)
+    rounded_up(nanos, step)
 }
 
 /// Text as YAML: plain if YAML reads it as text, otherwise quoted.

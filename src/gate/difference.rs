@@ -210,22 +210,17 @@ fn elements<'a>(
     rate: impl Fn(&str, [TopicIn<'a>; 2]) -> Option<Difference>,
 ) -> Vec<Difference> {
     let nodes = facts.each_ref().map(|facts| {
-        let roles = facts.robot_roles();
-        roles
-            .map(|role| (role.name, role))
-            .collect::<BTreeMap<&str, Role<'_>>>()
+        let roles = facts.robot_roles().map(|role| (role.name, role));
+        roles.collect::<BTreeMap<&str, Role<'_>>>()
     });
     let mut all = presence("node", &nodes);
     // Whether the mission that lacks a node would name it.
     let lost = |side| all.iter().filter(|one| one.side == side).count();
-    let in_second = facts[1].names_nodes(lost(Where::First));
-    let in_first = facts[0].names_nodes(lost(Where::Second));
+    let second = facts[1].names_nodes(lost(Where::First));
+    let first = facts[0].names_nodes(lost(Where::Second));
     for one in &mut all {
-        one.is_known = if one.side == Where::First {
-            in_second
-        } else {
-            in_first
-        };
+        let is_own = one.side == Where::First;
+        one.is_known = if is_own { second } else { first };
     }
     let topics = facts.each_ref().map(topics);
     all.extend(presence("topic", &topics));
@@ -254,9 +249,8 @@ fn topics<'a>(facts: &'a Facts<'a>) -> BTreeMap<&'a str, TopicIn<'a>> {
 
 /// The names in only one of these.
 fn presence<T>(kind: &'static str, both: &[BTreeMap<&str, T>; 2]) -> Vec<Difference> {
-    let [first, second] = both
-        .each_ref()
-        .map(|own| own.keys().copied().collect::<BTreeSet<&str>>());
+    let names = both.each_ref().map(|own| own.keys().copied());
+    let [first, second]: [BTreeSet<&str>; 2] = names.map(Iterator::collect);
     let only = first.symmetric_difference(&second).map(|name| {
         let side = Where::only(first.contains(name));
         Difference::only(kind, *name, side, "present")
@@ -395,17 +389,8 @@ impl EventKey {
     }
 }
 
-/// An event with names instead of ids.
-struct NamedEvent {
-    key: EventKey,
-    /// The time as text for people.
-    clock: String,
-    moment: Moment,
-    /// Whether it is listed separately: in the other run it may be a part of another event.
-    is_headline: bool,
-    /// Whether it is the silence of a robot's shutdown at the very end.
-    is_closing: bool,
-}
+/// An event that two runs can have in common.
+type NamedEvent<'a> = (EventKey, &'a Event);
 
 /// A time since the start of a mission and its uncertainty, in nanoseconds.
 #[derive(Clone, Copy)]
@@ -417,20 +402,26 @@ struct Moment {
 /// All differences in events: those in only one mission, or at another time.
 fn events(facts: &[Facts<'_>; 2]) -> Vec<Difference> {
     let [first, second] = &facts.each_ref().map(named_events);
-    let mut all = only(first, second, Where::First);
-    all.extend(only(second, first, Where::Second));
-    let places: BTreeMap<&EventKey, &NamedEvent> = second.iter().map(|t| (&t.key, t)).collect();
+    let mut all = only(&facts[0], first, second, Where::First);
+    all.extend(only(&facts[1], second, first, Where::Second));
+    let places: BTreeMap<&EventKey, &Event> = second.iter().map(|(key, e)| (key, *e)).collect();
     let mut shift = 0;
-    for one in first {
-        if let Some(other) = places.get(&one.key)
-            && one.is_headline
-            && other.is_headline
-            && is_moved([one.moment, other.moment], &mut shift)
-        {
-            let clocks = [&one.clock, &other.clock];
+    for (key, one) in first {
+        // One that is a headline may be a part of another event in the other run.
+        let other = places.get(key).filter(|other| other.is_headline());
+        let Some(other) = other.filter(|_| one.is_headline()) else {
+            continue;
+        };
+        let both = [(&facts[0], *one), (&facts[1], *other)];
+        let moments = both.map(|(facts, event)| Moment {
+            at: facts.mission.offset(event.time),
+            doubt: event.latest.since(event.earliest),
+        });
+        if is_moved(moments, &mut shift) {
+            let clocks = both.map(|(facts, event)| facts.clock(event.time));
             all.push(Difference {
-                element: one.key.name.clone(),
-                ..Difference::changed("time", one.key.text(), clocks)
+                element: key.name.clone(),
+                ..Difference::changed("time", key.text(), clocks)
             });
         }
     }
@@ -438,7 +429,7 @@ fn events(facts: &[Facts<'_>; 2]) -> Vec<Difference> {
 }
 
 /// The events that two runs can have in common.
-fn named_events(facts: &Facts<'_>) -> Vec<NamedEvent> {
+fn named_events<'a>(facts: &Facts<'a>) -> Vec<NamedEvent<'a>> {
     let mission = facts.mission;
     let mut many: BTreeMap<(Kind, &str), usize> = BTreeMap::new();
     let mut all = Vec::new();
@@ -449,20 +440,12 @@ fn named_events(facts: &Facts<'_>) -> Vec<NamedEvent> {
         };
         let nth = many.entry((event.kind, name)).or_default();
         *nth += 1;
-        all.push(NamedEvent {
-            key: EventKey {
-                kind: event.kind,
-                name: name.to_owned(),
-                nth: *nth,
-            },
-            clock: facts.clock(event.time),
-            moment: Moment {
-                at: mission.offset(event.time),
-                doubt: event.latest.since(event.earliest),
-            },
-            is_headline: event.is_headline(),
-            is_closing: mission.span.end.since(event.time) <= CLOSING_NS,
-        });
+        let key = EventKey {
+            kind: event.kind,
+            name: name.to_owned(),
+            nth: *nth,
+        };
+        all.push((key, event));
     }
     all
 }
@@ -479,17 +462,26 @@ fn about<'a>(facts: &Facts<'a>, event: &Event) -> Option<&'a str> {
 }
 
 /// The events in only one mission about elements of both. Starts and stops are reported for the elements.
-fn only(own: &[NamedEvent], other: &[NamedEvent], side: Where) -> Vec<Difference> {
-    let known: BTreeSet<&EventKey> = other.iter().map(|t| &t.key).collect();
+fn only(
+    facts: &Facts<'_>,
+    own: &[NamedEvent<'_>],
+    other: &[NamedEvent<'_>],
+    side: Where,
+) -> Vec<Difference> {
+    let known: BTreeSet<&EventKey> = other.iter().map(|(key, _)| key).collect();
     let wanted = [Kind::HandedOver, Kind::Silent, Kind::Lifecycle];
-    let alone = own.iter().filter(|t| {
+    let alone = own.iter().filter(|(key, event)| {
         // Silence at the very end is due to the robot's shutdown, if the other recording lasts that long.
-        let is_shown = t.is_headline && wanted.contains(&t.key.kind) && !t.is_closing;
-        is_shown && !known.contains(&t.key)
+        let is_closing = facts.mission.span.end.since(event.time) <= CLOSING_NS;
+        let is_shown = event.is_headline() && wanted.contains(&key.kind) && !is_closing;
+        is_shown && !known.contains(key)
     });
-    let differences = alone.map(|t| Difference {
-        element: t.key.name.clone(),
-        ..Difference::only("event", t.key.text(), side, &format!("at {}", t.clock))
+    let differences = alone.map(|(key, event)| {
+        let clock = format!("at {}", facts.clock(event.time));
+        Difference {
+            element: key.name.clone(),
+            ..Difference::only("event", key.text(), side, &clock)
+        }
     });
     differences.collect()
 }
@@ -557,7 +549,7 @@ fn times(facts: &[Facts<'_>; 2], known: &[Difference]) -> Vec<Difference> {
 impl<'a> Sent<'a> {
     fn of(name: &'a str, both: [TopicIn<'a>; 2]) -> Option<Self> {
         let received = both.map(|TopicIn { facts, id }| {
-            let is_enough = facts.messages(id) >= FEWEST_OF_TIMES;
+            let is_enough = facts.messages[id] >= FEWEST_OF_TIMES;
             facts.received(id).filter(|_| is_enough)
         });
         let [Some(first), Some(second)] = received else {

@@ -423,9 +423,8 @@ fn rule(At { at, value }: At<Keyed<Entry>>) -> Result<Rule, BadYaml> {
         return Err(BadYaml::new(at, "the rule has no subject", hint));
     };
     let hint = format!("`{form}` can be combined with {}", with.replace(' ', ", "));
-    let mut others = keys
-        .iter()
-        .filter(|key| ![*form, "id"].contains(&&*key.value));
+    let is_fact = |key: &&At<String>| ![*form, "id"].contains(&&*key.value);
+    let mut others = keys.iter().filter(is_fact);
     let is_other = |key: &&At<String>| with.split(' ').all(|own| own != key.value);
     if let Some(key) = others.clone().find(is_other) {
         let reason = format!("`{}` cannot be combined with `{form}`", key.value);

@@ -13,7 +13,7 @@ use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::{Bound, Sending};
-use crate::graph::{ById, EdgeId, Element, NodeId, PerElement, Row, State, TopicId, Wiring};
+use crate::graph::{ById, Edge, EdgeId, Element, NodeId, PerElement, Row, State, TopicId, Wiring};
 use crate::mission::event_log::{Event, Kind};
 use crate::mission::rates::Rates;
 use crate::mission::{Mission, Window};
@@ -24,7 +24,7 @@ pub(crate) struct Facts<'a> {
     /// The strongest confidence to which each element is known.
     confidences: PerElement<Confidence>,
     /// The number of messages of each topic.
-    messages: ById<TopicId, u64>,
+    pub(crate) messages: ById<TopicId, u64>,
     /// Whether a tool rewrote the bag, so that merged publishers cannot be distinguished.
     pub(crate) is_rewritten: bool,
     /// Present nodes by role.
@@ -210,13 +210,11 @@ impl<'a> Facts<'a> {
                 events[id].push(event);
             }
         }
-        let lists_all = elements
-            .subscribes
-            .iter()
-            .any(|edge| has(edge.seen.evidence, &LISTING) && !elements.nodes[edge.node].is_tool());
+        let lists =
+            |edge: &Edge| has(edge.seen.evidence, &LISTING) && !elements.nodes[edge.node].is_tool();
         Self {
             events,
-            lists_all,
+            lists_all: elements.subscribes.iter().any(lists),
             mission,
             confidences,
             messages: elements.topics.ids().map(count).collect(),
@@ -280,11 +278,6 @@ impl<'a> Facts<'a> {
                 || !any(&self.subscribers(topic)))
     }
 
-    /// The number of messages of a topic.
-    pub(crate) fn messages(&self, topic: TopicId) -> u64 {
-        self.messages[topic]
-    }
-
     pub(crate) fn node(&self, id: NodeId) -> &'a str {
         self.mission.elements.nodes[id].name.as_str()
     }
@@ -328,7 +321,7 @@ impl<'a> Facts<'a> {
     /// The topics with messages, without housekeeping.
     pub(crate) fn robot_topics(&self) -> impl Iterator<Item = TopicIn<'_>> {
         let all = self.topics(&Pattern::new("**")).into_iter();
-        let own = all.filter(|id| !self.is_housekeeping(*id) && self.messages(*id) > 0);
+        let own = all.filter(|id| !self.is_housekeeping(*id) && self.messages[*id] > 0);
         own.map(|id| TopicIn { facts: self, id })
     }
 
@@ -360,9 +353,8 @@ impl<'a> Facts<'a> {
 
     /// The roles of these, without tools and without what is only inferred.
     pub(crate) fn sure_roles(&self, peers: &[Peer]) -> BTreeSet<String> {
-        let sure = peers
-            .iter()
-            .filter(|peer| peer.is_sure() && !self.is_tool(&[peer.node]));
+        let sure = peers.iter();
+        let sure = sure.filter(|peer| peer.is_sure() && !self.is_tool(&[peer.node]));
         sure.map(|peer| self.role(peer.node).to_owned()).collect()
     }
 
@@ -398,10 +390,8 @@ impl<'a> Facts<'a> {
         let elements = &self.mission.elements;
         let is_linked = |id: NodeId| {
             let topics = self.wiring.subscribed[id].iter();
-            let edges = topics.filter_map(move |topic| elements.subscription(*topic, id));
-            edges
-                .into_iter()
-                .any(|edge| has(elements.subscribes[edge].seen.evidence, &["links"]))
+            let mut edges = topics.filter_map(|topic| elements.subscription(*topic, id));
+            edges.any(|edge| has(elements.subscribes[edge].seen.evidence, &["links"]))
         };
         self.lists_all || nodes.iter().any(|id| is_linked(*id))
     }
@@ -463,7 +453,7 @@ impl<'a> Facts<'a> {
             _ if states.contains(&State::Latched) => Some(true),
             Some(qos) => Some(qos.contains("transient_local")),
             // Without a message in the checked time it is unknown.
-            None if states.contains(&State::Silent) && self.messages(topic) > 0 => Some(false),
+            None if states.contains(&State::Silent) && self.messages[topic] > 0 => Some(false),
             None => None,
         }
     }
@@ -510,9 +500,8 @@ impl<'a> Facts<'a> {
             many > 0 && !self.is_housekeeping(topic)
         };
         let topics = |node| self.wiring.published[node].iter();
-        nodes
-            .iter()
-            .any(|node| topics(*node).any(|topic| sends(*node, *topic)))
+        let sends = |node: &NodeId| topics(*node).any(|topic| sends(*node, *topic));
+        nodes.iter().any(sends)
     }
 
     /// The first and the last message of a topic, the latter 1 ns before the end; `None` if it has none.
@@ -569,7 +558,7 @@ impl<'a> Facts<'a> {
     /// two.
     pub(crate) fn mean(&self, topic: TopicId) -> Option<Rate> {
         let received = self.received(topic)?;
-        let count = self.messages(topic).checked_sub(1)?;
+        let count = self.messages[topic].checked_sub(1)?;
         (count > 0).then_some(Rate {
             window: 0,
             span: received,
@@ -617,17 +606,12 @@ impl<'a> Facts<'a> {
 
     /// The longest silences of a topic inside `during`: those of the whole mission, to the nanosecond if message times
     /// are known; the longest of each window; and, unless it `may_end`, from its last message to the mission's end.
-    pub(crate) fn silences(
-        &self,
-        topic: TopicId,
-        may_end: bool,
-        during: Span,
-    ) -> Vec<TopicSilence> {
+    pub(crate) fn silences(&self, topic: TopicId, may_end: bool, during: Span) -> Vec<TopicGap> {
         let mut all = Vec::new();
         for (window, row) in self.rows(topic) {
             let inside = during.start <= window.span.start && window.span.end <= during.end;
             if let (true, Some(gap)) = (inside, row.gap.value()) {
-                all.push(TopicSilence {
+                all.push(TopicGap {
                     span: window.span,
                     nanos: cast::to_i64(libm::round(gap * 1e9)),
                 });
@@ -650,12 +634,9 @@ impl<'a> Facts<'a> {
     /// The longest silence of a topic between its first and its last message, in nanoseconds; at least a window's length
     /// if single messages are unknown.
     pub(crate) fn longest_silence(&self, topic: TopicId) -> i64 {
-        let longest = self.longest_of(topic, true).unwrap_or(0);
-        if self.mission.sending.knows_messages() {
-            longest
-        } else {
-            longest.max(self.mission.period.nanos())
-        }
+        let is_exact = self.mission.sending.knows_messages();
+        let least = (!is_exact).then(|| self.mission.period.nanos());
+        self.longest_of(topic, true).max(least).unwrap_or(0)
     }
 
     /// The longest of the topic's silences in the mission, in nanoseconds.
@@ -673,16 +654,12 @@ impl<'a> Facts<'a> {
         around: Span,
     ) -> Option<Cause> {
         let direct: BTreeSet<NodeId> = self.publishers(topic).iter().map(|p| p.node).collect();
-        let fed = direct
-            .iter()
-            .flat_map(|node| &self.wiring.subscribed[*node]);
+        let fed = direct.iter();
+        let fed = fed.flat_map(|node| &self.wiring.subscribed[*node]);
         let fed: BTreeSet<&TopicId> = fed.filter(|id| **id != topic).collect();
-        let feeders: BTreeSet<NodeId> = fed
-            .iter()
-            .flat_map(|topic| self.publishers(**topic))
-            .map(|p| p.node)
-            .filter(|node| !direct.contains(node))
-            .collect();
+        let feeders = fed.iter().flat_map(|topic| self.publishers(**topic));
+        let feeders: BTreeSet<NodeId> = feeders.map(|peer| peer.node).collect();
+        let feeders = &feeders - &direct;
         self.cause(&direct, kinds, around)
             .or_else(|| self.cause(&feeders, kinds, around))
     }
@@ -697,14 +674,11 @@ impl<'a> Facts<'a> {
         let events = self.mission.log.inside(around).map(|(_, event)| event);
         let mut events = events.filter(|e| kinds.contains(&e.kind));
         let event = events.find(|e| matches!(e.what, Element::Node(id) if nodes.contains(&id)))?;
-        self.mission.elements.ends(event.what).0.map(|node| Cause {
+        let role = self.role(self.mission.elements.ends(event.what).0?);
+        let (word, clock) = (event.kind.word(), self.clock(event.time));
+        Some(Cause {
             time: Some(event.time),
-            text: format!(
-                "{} {} at {}",
-                self.role(node),
-                event.kind.word(),
-                self.clock(event.time)
-            ),
+            text: format!("{role} {word} at {clock}"),
         })
     }
 
@@ -743,7 +717,7 @@ fn begun(window: Span, first: Stamp) -> Option<Span> {
 
 /// A time without messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct TopicSilence {
+pub(crate) struct TopicGap {
     /// The time of the silence, or the window that it is in.
     pub(crate) span: Span,
     /// Its length in nanoseconds.
@@ -751,8 +725,8 @@ pub(crate) struct TopicSilence {
 }
 
 /// The part of a silence within a time range.
-fn clipped(gap: Span, during: Span) -> Option<TopicSilence> {
+fn clipped(gap: Span, during: Span) -> Option<TopicGap> {
     let span = Span::new(gap.start.max(during.start), gap.end.min(during.end));
     let nanos = span.end.since(span.start);
-    (nanos > 0).then_some(TopicSilence { span, nanos })
+    (nanos > 0).then_some(TopicGap { span, nanos })
 }

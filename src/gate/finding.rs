@@ -234,12 +234,7 @@ fn escaped(text: impl fmt::Display) -> String {
 
 impl Finding {
     /// A finding about a name, of severity [`Severity::Error`].
-    pub(crate) fn new(
-        kind: FindingKind,
-        name: &str,
-        place: YamlPlace,
-        text: impl fmt::Display,
-    ) -> Self {
+    pub(crate) fn new(kind: FindingKind, name: &str, place: YamlPlace, text: String) -> Self {
         Self {
             kind,
             severity: Severity::Error,
@@ -259,12 +254,7 @@ impl Finding {
     }
 
     /// A finding that is not observable, with the reason in its text.
-    pub(crate) fn unknown(
-        kind: FindingKind,
-        name: &str,
-        place: YamlPlace,
-        text: impl fmt::Display,
-    ) -> Self {
+    pub(crate) fn unknown(kind: FindingKind, name: &str, place: YamlPlace, text: String) -> Self {
         Self::new(kind, name, place, text).severe(Severity::Unknown)
     }
 
@@ -358,9 +348,12 @@ mod tests {
     #[test]
     fn a_fingerprint_is_independent_of_lines_and_numbers() {
         let at = |line| YamlPlace { line, column: 1 };
-        let one = Finding::new(FindingKind::TopicRateLow, "/scan", at(3), "a").saw("7", "9..");
-        let two = Finding::new(FindingKind::TopicRateLow, "/scan", at(9), "b").saw("6", "9..");
-        let other = Finding::new(FindingKind::TopicRateLow, "/scan2", at(3), "a").saw("7", "9..");
+        let one =
+            Finding::new(FindingKind::TopicRateLow, "/scan", at(3), "a".to_owned()).saw("7", "9..");
+        let two =
+            Finding::new(FindingKind::TopicRateLow, "/scan", at(9), "b".to_owned()).saw("6", "9..");
+        let other = Finding::new(FindingKind::TopicRateLow, "/scan2", at(3), "a".to_owned())
+            .saw("7", "9..");
         assert_eq!(one.fingerprint(), two.fingerprint());
         assert_ne!(one.fingerprint(), other.fingerprint());
         assert_eq!(one.fingerprint().len(), 12);

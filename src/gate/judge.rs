@@ -394,10 +394,8 @@ impl Judge<'_> {
             !known.hold(role.name) && !names.any(|name| known.hold(name))
         });
         let found = strange.map(|role| {
-            let name = role
-                .nodes
-                .first()
-                .map_or(role.name, |id| self.facts.node(*id));
+            let node = role.nodes.first();
+            let name = node.map_or(role.name, |id| self.facts.node(*id));
             let text = match role.name {
                 own if own == name => name.to_owned(),
                 own => format!("{name} (role {own})"),
@@ -426,9 +424,8 @@ impl Judge<'_> {
         let known: NamePatterns<'_> = self.expectation.topics.iter().map(|t| &t.name).collect();
         let names = self.facts.robot_topics().map(|topic| topic.name());
         let strange = names.filter(|name| !known.hold(name));
-        strange
-            .map(|name| self.strange(FindingKind::UnexpectedTopic, name, name, severity))
-            .collect()
+        let finding = |name| self.strange(FindingKind::UnexpectedTopic, name, name, severity);
+        strange.map(finding).collect()
     }
 }
 

@@ -185,10 +185,8 @@ fn quoted(text: &str) -> String {
 pub(crate) fn explain(word: &str, width: usize) -> Result<String> {
     let words = || KINDS.iter().map(|row| row.word);
     let Some(kind) = FindingKind::from_word(word) else {
-        let what = format!(
-            "unknown kind of finding `{word}`{}",
-            suggestion(word, words())
-        );
+        let near = suggestion(word, words());
+        let what = format!("unknown kind of finding `{word}`{near}");
         let hint = format!("choose one of {}", words::joined(words(), ", "));
         return Err(Error::usage(what, hint));
     };

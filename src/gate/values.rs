@@ -307,9 +307,8 @@ impl Measure {
 fn bytes_per_second(text: &str) -> Option<f64> {
     const UNITS: [(&str, f64); 4] = [("kB", 1e3), ("MB", 1e6), ("GB", 1e9), ("B", 1.0)];
     let text = text.strip_suffix("/s").unwrap_or(text);
-    let unit = UNITS
-        .iter()
-        .find_map(|(unit, size)| Some((text.strip_suffix(unit)?, size)));
+    let mut units = UNITS.iter();
+    let unit = units.find_map(|(unit, size)| Some((text.strip_suffix(unit)?, size)));
     let (number, size) = unit.unwrap_or((text, &1.0));
     let number: f64 = number.trim_end().parse().ok()?;
     Some(number * size).filter(|bytes| (0.0..1e18).contains(bytes))

@@ -246,9 +246,8 @@ impl Diff {
 /// The names of two missions, without folders unless the names differ only in these.
 fn subject(readings: &[Reading; 2]) -> DiffSubject {
     let names = |name: fn(&Input) -> String| {
-        readings
-            .each_ref()
-            .map(|reading| words::some_of(reading.inputs.iter().map(name), 2))
+        let names = |reading: &Reading| words::some_of(reading.inputs.iter().map(name), 2);
+        readings.each_ref().map(names)
     };
     let short = names(Input::name);
     let [first, second] = if short[0] == short[1] {

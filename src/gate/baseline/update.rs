@@ -42,16 +42,13 @@ pub(crate) fn update(
         runs,
     };
     let checks = |run| judge(&expectation, run, is_part).checks;
-    let found = runs
-        .iter()
-        .flat_map(checks)
-        .flat_map(|check| check.findings);
+    let found = runs.iter().flat_map(checks);
+    let found = found.flat_map(|check| check.findings);
     let findings: Vec<Finding> = found.filter(|f| f.severity != Severity::Unknown).collect();
     let left = findings.iter().filter(|f| f.accept.is_none()).count();
     let mut seen = BTreeSet::new();
-    let named = findings
-        .iter()
-        .filter_map(|f| Some((f.accept.as_deref()?, f)));
+    let named = findings.iter();
+    let named = named.filter_map(|f| Some((f.accept.as_deref()?, f)));
     let wanted = named.filter(|(name, finding)| {
         let is_meant = |o: &String| o == name || *o == finding.name;
         (only.is_empty() || only.iter().any(is_meant))
@@ -59,12 +56,9 @@ pub(crate) fn update(
     });
     let wanted: Vec<(&str, &Finding)> = wanted.collect();
     if wanted.len() > MOST {
+        let (facts, path) = (words::count(wanted.len(), "fact"), path.display());
         return Err(Error::usage(
-            format!(
-                "{} of `{}` no longer match, as if it described another robot",
-                words::count(wanted.len(), "fact"),
-                path.display()
-            ),
+            format!("{facts} of `{path}` no longer match, as if it described another robot"),
             "generate a new one with `bagreel baseline BAG -o graph.yaml`, or update single names with `--only NAME`",
         ));
     }

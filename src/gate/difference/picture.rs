@@ -98,7 +98,7 @@ fn side_of(mission: &Mission) -> MissionSide {
         let topic = Known {
             evidence: elements.topics[id].seen.evidence,
             types: own.types(),
-            count: Some(facts.messages(id)),
+            count: Some(facts.messages[id]),
             hz: facts.while_sending(id),
             ..Known::default()
         };

@@ -24,13 +24,8 @@ impl Judge<'_> {
         self.check(all, "within", &entry.within, is_untimed, Self::late);
         self.check(all, "may_end", &entry.limit(), is_untimed, Self::ended);
         self.check(all, "restarts", &entry.restarts, is_absent, Self::restarted);
-        self.check(
-            all,
-            "lifecycle",
-            &entry.lifecycle,
-            is_absent,
-            Self::lifecycle,
-        );
+        let state = &entry.lifecycle;
+        self.check(all, "lifecycle", state, is_absent, Self::lifecycle);
     }
 
     pub(super) fn forbidden_nodes(&self, pattern: &Pattern, at: YamlPlace) -> Vec<Finding> {
@@ -79,10 +74,8 @@ impl Judge<'_> {
         if entry.may_end.is_some() {
             return Vec::new();
         }
-        let gone = roles
-            .iter()
-            .filter_map(|role| self.gone(*role, "to stay", at));
-        gone.collect()
+        let gone = |role| self.gone(role, "to stay", at);
+        roles.into_iter().filter_map(gone).collect()
     }
 
     /// The finding that a node's presence is not observable.
@@ -191,11 +184,8 @@ impl Judge<'_> {
         let at = Span::new(began.time, began.time.plus(1));
         let nodes = role.nodes.iter().copied().collect();
         let cause = self.facts.cause(&nodes, &[Kind::Started], at);
-        Some(
-            finding
-                .at(Span::new(whole.start, began.time))
-                .because(cause),
-        )
+        let finding = finding.at(Span::new(whole.start, began.time));
+        Some(finding.because(cause))
     }
 
     fn restarted(&self, role: Role<'_>, _: &Entry, range: &At<Range>) -> Option<Finding> {

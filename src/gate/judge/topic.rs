@@ -1,15 +1,18 @@
 //! Checks of topics: presence, type, publishers, subscribers, quality of service; rates, gaps and measures in every whole window.
 
+use std::collections::BTreeSet;
+
 use super::{Judge, NAMED, Subjects, absence};
 use crate::base::name::plain_type;
 use crate::base::rhythm::{CLOSING_NS, DISCOVERY_NS};
 use crate::base::time::Span;
 use crate::base::words;
 use crate::gate::expectation::{At, Entry, Length, MayEnd, Names, Within, YamlPlace};
-use crate::gate::facts::{ENDS, Peer, Rate, Role, TopicSilence};
+use crate::gate::facts::{ENDS, Peer, Rate, Role, TopicGap};
 use crate::gate::finding::{Finding, FindingKind};
 use crate::gate::values::{Measure, Pattern, Range};
 use crate::graph::{NodeId, TopicId};
+use crate::mission::Window;
 use crate::mission::event_log::Kind;
 
 /// The names of a list, in short.
@@ -53,7 +56,7 @@ impl Judge<'_> {
             let text = format!("{name} is in the bag, and `{pattern}` is forbidden");
             Finding::new(FindingKind::TopicForbidden, name, at, text)
                 .saw("present", "absent")
-                .details([words::count(self.facts.messages(topic), "message")])
+                .details([words::count(self.facts.messages[topic], "message")])
         });
         found.collect()
     }
@@ -105,7 +108,7 @@ impl Judge<'_> {
 
     /// Whether any of these topics has a message.
     pub(super) fn is_sent(&self, topics: &[TopicId]) -> bool {
-        topics.iter().any(|topic| self.facts.messages(*topic) > 0)
+        topics.iter().any(|topic| self.facts.messages[*topic] > 0)
     }
 
     fn kind(&self, topic: TopicId, _: &Entry, kinds: &At<Names>) -> Option<Finding> {
@@ -132,9 +135,8 @@ impl Judge<'_> {
         let names = || by.value.0.iter();
         let fits = |name: &Pattern, peer: &Peer| self.facts.fits(name, peer.node);
         let lost = names().filter(|name| !known.iter().any(|peer| fits(&name.value, peer)));
-        let mut found: Vec<Finding> = lost
-            .map(|name| self.no_publisher(topic, &known, name))
-            .collect();
+        let found = lost.map(|name| self.no_publisher(topic, &known, name));
+        let mut found: Vec<Finding> = found.collect();
         let policy = self.expectation.policy.value;
         let Some(severity) = policy.unexpected_publishers.severity() else {
             return found;
@@ -415,7 +417,7 @@ impl Judge<'_> {
         let during = self.during(entry);
         let silences = self.facts.silences(topic, entry.may_end.is_some(), during);
         let longest = silences.into_iter().max_by_key(|silence| silence.nanos)?;
-        let TopicSilence { span, nanos } = longest;
+        let TopicGap { span, nanos } = longest;
         let At { at, value: most } = *most;
         if nanos <= most.0 {
             return None;
@@ -442,16 +444,14 @@ impl Judge<'_> {
         let At { at, value: range } = *range;
         let (key, name) = (measure.key, self.facts.topic(topic));
         let judged = self.judged(topic, entry);
-        let is_judged = |window: usize| {
-            judged
-                .binary_search_by_key(&window, |rate| rate.window)
-                .is_ok()
-        };
+        let judged: BTreeSet<usize> = judged.iter().map(|rate| rate.window).collect();
         let rows = self.facts.rows(topic);
-        let rows = rows.filter(|(window, _)| is_judged(window.index));
-        let known: Vec<(Span, f64)> = rows
-            .filter_map(|(window, row)| Some((window.span, (measure.of)(&row, window.span)?)))
-            .collect();
+        let rows = rows.filter(|(window, _)| judged.contains(&window.index));
+        let known = rows.filter_map(|(window, row)| {
+            let Window { span, .. } = *window;
+            Some((span, (measure.of)(&row, span)?))
+        });
+        let known: Vec<(Span, f64)> = known.collect();
         if known.is_empty() {
             let text = format!("cannot tell the {key} of {name}: this bag does not record it");
             let hint = "enable topic statistics, or record `/statistics`";

@@ -209,10 +209,8 @@ pub(super) fn junit(subject: &Subject<'_>, verdict: &Verdict) -> String {
     // A warning passes, as it does for the exit code.
     let is_failed = |check: &&CheckedFact| !of_severity(check, Severity::Error).is_empty();
     let failures = verdict.checks.iter().filter(is_failed).count();
-    let mut xml = suites(
-        &subject.name(),
-        [verdict.checks.len(), failures, 0, skipped],
-    );
+    let counts = [verdict.checks.len(), failures, 0, skipped];
+    let mut xml = suites(&subject.name(), counts);
     for check in &verdict.checks {
         case(&mut xml, subject, check);
     }

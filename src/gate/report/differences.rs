@@ -26,23 +26,17 @@ fn sign(difference: &Difference) -> char {
 
 /// A difference as text: `only in a.bag`, or `15 Hz → 7.4 Hz`.
 fn how(subject: &DiffSubject, difference: &Difference) -> String {
-    let value = |text: &str| {
-        if text == "present" {
-            String::new()
-        } else {
-            format!(", {text}")
-        }
+    let value = |text: &str| match text {
+        "present" => String::new(),
+        text => format!(", {text}"),
     };
     let (in_one, other, what) = match difference.side {
         Where::First => (&subject.first, &subject.second, &difference.first),
         Where::Second => (&subject.second, &subject.first, &difference.second),
         Where::Both => return format!("{} → {}", difference.first, difference.second),
     };
-    let doubt = if difference.is_known {
-        String::new()
-    } else {
-        format!("; unknown in {other}")
-    };
+    let doubt = format!("; unknown in {other}");
+    let doubt = if difference.is_known { "" } else { &doubt };
     format!("only in {in_one}{}{doubt}", value(what))
 }
 

@@ -120,11 +120,8 @@ fn findings_table(facts: &Facts<'_>, groups: &[Group<'_>], out: &mut String) {
 }
 
 fn finding_row(facts: &Facts<'_>, finding: &Finding, is_alone: bool) -> String {
-    let sign = if finding.severity == Severity::Error {
-        "❌"
-    } else {
-        "⚠"
-    };
+    let is_error = finding.severity == Severity::Error;
+    let sign = if is_error { "❌" } else { "⚠" };
     let when = match finding.when {
         Some(span) => facts.stretch(span),
         None if finding.kind == FindingKind::NodeLifecycle => "at the end".to_owned(),
@@ -151,11 +148,8 @@ fn finding_row(facts: &Facts<'_>, finding: &Finding, is_alone: bool) -> String {
 
 /// A value: names as code, other words unchanged.
 fn value(text: &str) -> String {
-    if text.starts_with('/') {
-        code(text)
-    } else {
-        plain(text)
-    }
+    let is_name = text.starts_with('/');
+    if is_name { code(text) } else { plain(text) }
 }
 
 /// Writes the findings that are not observable.
@@ -182,14 +176,10 @@ fn undecidable(findings: &[&Finding], out: &mut String) {
 /// A marker comment by which an action finds its earlier text, without characters that end the comment.
 fn mark(name: &str) -> String {
     let harmless = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.');
-    let mark: String = name
-        .chars()
-        .map(|c| if harmless(c) { c } else { '_' })
-        .collect();
-    let endings = [".mcap", ".bag", ".db3", ".yaml", ".yml"];
-    let mark = endings
-        .iter()
-        .fold(mark.as_str(), |mark, ending| mark.trim_end_matches(ending));
+    let mut mark = name.replace(|c| !harmless(c), "_");
+    for ending in [".mcap", ".bag", ".db3", ".yaml", ".yml"] {
+        mark.truncate(mark.trim_end_matches(ending).len());
+    }
     mark.chars().take(100).collect()
 }
 
@@ -216,10 +206,8 @@ fn chart(facts: &Facts<'_>, findings: &[&Finding]) -> Option<String> {
         marked.entry(own).or_insert(finding);
     }
     let arrows = arrows(facts, &marked, findings);
-    let mut boxes: BTreeSet<ChartBox<'_>> = arrows
-        .iter()
-        .flat_map(|(from, _, to)| [*from, *to])
-        .collect();
+    let ends = arrows.iter().flat_map(|(from, _, to)| [*from, *to]);
+    let mut boxes: BTreeSet<ChartBox<'_>> = ends.collect();
     boxes.extend(marked.keys().take(MOST_ITEMS));
     (!boxes.is_empty()).then(|| written(&boxes, &marked, &arrows))
 }
@@ -253,9 +241,8 @@ fn arrows<'a>(
     let received = received.map(|(node, topic)| (topic, "-->", node));
     let mut seen = BTreeSet::new();
     let all = missing.chain(sent).chain(received);
-    all.filter(|(from, _, to)| seen.insert((*from, *to)))
-        .take(MOST_EDGES)
-        .collect()
+    let all = all.filter(|(from, _, to)| seen.insert((*from, *to)));
+    all.take(MOST_EDGES).collect()
 }
 
 fn written(

@@ -23,8 +23,23 @@ pub(super) fn text(subject: &Subject<'_>, verdict: &Verdict) -> String {
         let known = group.findings.iter();
         let known = known.filter(|f| f.severity != Severity::Unknown);
         let names: BTreeSet<&str> = known.filter_map(|f| f.accept.as_deref()).collect();
-        for one in group.findings {
-            finding(subject, one, is_one, &mut hinted, &mut out);
+        for finding in group.findings {
+            let (severity, kind) = (finding.severity.word(), finding.kind.word());
+            // Writing into a string does not fail.
+            let _ = writeln!(out, "{severity}[{kind}]: {}", finding.text);
+            let _ = writeln!(out, "  --> {}:{}", subject.file, finding.place.line);
+            for line in &finding.details {
+                let _ = writeln!(out, "   |  {line}");
+            }
+            if let Some(cause) = finding.cause.as_ref().filter(|_| is_one)
+                && !cause.is_about(&finding.name)
+            {
+                let _ = writeln!(out, "   |  since {}", cause.text);
+            }
+            // Hints apply to all findings of a kind.
+            for hint in finding.help.iter().filter(|hint| hinted.insert(*hint)) {
+                let _ = writeln!(out, "   =  {hint}");
+            }
         }
         // Once per cause.
         if !names.is_empty() {
@@ -47,31 +62,6 @@ fn last_line(subject: &Subject<'_>, verdict: &Verdict) -> String {
         subject.file,
         words::count(kept, "rule")
     )
-}
-
-fn finding(
-    subject: &Subject<'_>,
-    finding: &Finding,
-    is_alone: bool,
-    hinted: &mut BTreeSet<String>,
-    out: &mut String,
-) {
-    let (severity, kind) = (finding.severity.word(), finding.kind.word());
-    // Writing into a string does not fail.
-    let _ = writeln!(out, "{severity}[{kind}]: {}", finding.text);
-    let _ = writeln!(out, "  --> {}:{}", subject.file, finding.place.line);
-    for line in &finding.details {
-        let _ = writeln!(out, "   |  {line}");
-    }
-    if let Some(cause) = finding.cause.as_ref().filter(|_| is_alone)
-        && !cause.is_about(&finding.name)
-    {
-        let _ = writeln!(out, "   |  since {}", cause.text);
-    }
-    // Hints apply to all findings of a kind.
-    for hint in finding.help.iter().filter(|h| hinted.insert((*h).clone())) {
-        let _ = writeln!(out, "   =  {hint}");
-    }
 }
 
 /// The number of annotations of one kind per step; GitHub silently drops more.
