@@ -91,10 +91,7 @@ pub(crate) struct LaunchWork {
 impl LaunchWork {
     /// The whole allowance, for a file and what it includes.
     pub(crate) fn all() -> Self {
-        Self {
-            left: LAUNCH_WORK,
-            is_spent: false,
-        }
+        Self::of_text(LAUNCH_WORK)
     }
 
     /// The allowance for a single text of this many bytes: loops over long lists need a tenth of it.
@@ -107,16 +104,10 @@ impl LaunchWork {
 
     /// Takes `work` from the allowance; `None` if less is left.
     pub(crate) fn spend(&mut self, work: usize) -> Option<()> {
-        match self.left.checked_sub(work) {
-            Some(left) if !self.is_spent => {
-                self.left = left;
-                Some(())
-            }
-            _ => {
-                self.is_spent = true;
-                None
-            }
-        }
+        let left = self.left.checked_sub(work);
+        self.is_spent |= left.is_none();
+        self.left = left.filter(|_| !self.is_spent)?;
+        Some(())
     }
 }
 

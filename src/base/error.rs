@@ -158,9 +158,7 @@ impl Error {
                 None => io_hint(source).to_owned(),
             },
             Self::Malformed { hint, .. } => hint.clone(),
-            other => other
-                .fault()
-                .map_or_else(String::new, |fault| fault.hint.clone()),
+            other => other.fault().map_or("", |fault| &fault.hint).to_owned(),
         }
     }
 
@@ -172,16 +170,13 @@ impl Error {
 
 /// The file beside a missing one whose name is nearest to its.
 fn misspelled(source: &io::Error, path: &Path) -> Option<String> {
-    let name = path
-        .file_name()
-        .filter(|_| source.kind() == io::ErrorKind::NotFound)?;
-    let folder = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty());
+    let is_missing = source.kind() == io::ErrorKind::NotFound;
+    let name = path.file_name().filter(|_| is_missing)?;
+    let folder = path.parent();
+    let folder = folder.filter(|folder| !folder.as_os_str().is_empty());
     let files = folder.unwrap_or(Path::new(".")).read_dir().ok()?.flatten();
-    let names: Vec<String> = files
-        .map(|file| file.file_name().display().to_string())
-        .collect();
+    let names = files.map(|file| file.file_name().display().to_string());
+    let names: Vec<String> = names.collect();
     let near = nearest(&name.to_string_lossy(), names.iter().map(String::as_str))?;
     Some(path.with_file_name(near).display().to_string())
 }

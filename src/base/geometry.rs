@@ -25,10 +25,8 @@ impl Point {
     /// The point at this part of the way to another.
     #[must_use]
     pub fn towards(self, other: Self, part: f64) -> Self {
-        Self::new(
-            self.x + (other.x - self.x) * part,
-            self.y + (other.y - self.y) * part,
-        )
+        let mix = |from: f64, to: f64| from + (to - from) * part;
+        Self::new(mix(self.x, other.x), mix(self.y, other.y))
     }
 }
 
@@ -75,12 +73,8 @@ impl Rect {
 
     /// The rectangle of this size around a centre.
     pub fn around(centre: Point, size: Size) -> Self {
-        Self::new(
-            centre.x - size.w / 2.0,
-            centre.y - size.h / 2.0,
-            size.w,
-            size.h,
-        )
+        let Size { w, h } = size;
+        Self::new(centre.x - w / 2.0, centre.y - h / 2.0, w, h)
     }
 
     /// The smallest rectangle around points; `None` without any.
@@ -127,12 +121,8 @@ impl Rect {
     /// Grown by `by` on every side (shrunk if negative).
     #[must_use]
     pub fn grown(&self, by: f64) -> Self {
-        Self::new(
-            self.x - by,
-            self.y - by,
-            self.w + 2.0 * by,
-            self.h + 2.0 * by,
-        )
+        let (w, h) = (self.w + 2.0 * by, self.h + 2.0 * by);
+        Self::new(self.x - by, self.y - by, w, h)
     }
 
     /// The smallest rectangle around both.

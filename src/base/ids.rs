@@ -102,10 +102,8 @@ impl<I: Id, T> ById<I, T> {
 
     /// Every value with its id.
     pub fn with_ids(&self) -> impl ExactSizeIterator<Item = (I, &T)> + Clone {
-        self.list
-            .iter()
-            .enumerate()
-            .map(|(at, value)| (I::of(at), value))
+        let values = self.list.iter().enumerate();
+        values.map(|(at, value)| (I::of(at), value))
     }
 
     /// Adds the value of the next id, and returns that id.

@@ -213,8 +213,7 @@ pub(crate) fn is_feedback(topic: &str) -> bool {
 }
 
 fn is_numbered(name: &str, prefix: &str) -> bool {
-    let number = name.strip_prefix(prefix);
-    number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+    name.strip_prefix(prefix).is_some_and(is_number)
 }
 
 // The parts of an anonymous name: the role of a node, which is its name without the suffix that makes it unique, and

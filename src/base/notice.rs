@@ -100,12 +100,10 @@ impl Notices {
             return;
         }
         let full = self.0.len() >= NOTICES;
-        let key = (notice.kind, notice.text);
-        let key = if full && !self.0.contains_key(&key) {
-            (key.0, "more of the same kind".to_owned())
-        } else {
-            key
-        };
+        let mut key = (notice.kind, notice.text);
+        if full && !self.0.contains_key(&key) {
+            "more of the same kind".clone_into(&mut key.1);
+        }
         let is_choice = key.0 == NoticeKind::Chosen;
         let count = self.0.entry(key).or_default();
         *count = if is_choice { 1 } else { *count + notice.count };

@@ -186,9 +186,8 @@ pub fn parse_nanos(text: &str) -> Option<i64> {
         }
         return to_nanos(total);
     }
-    let digits = text
-        .find(|c: char| c.is_ascii_alphabetic())
-        .unwrap_or(text.len());
+    let unit = text.find(|c: char| c.is_ascii_alphabetic());
+    let digits = unit.unwrap_or(text.len());
     let scale = match text[digits..].trim() {
         "" | "s" | "sec" => 1.0,
         "ms" => 1e-3,

@@ -74,12 +74,9 @@ const MOST_RATES: usize = 4;
 pub fn rates(all_hz: &[f64]) -> String {
     let split: Vec<(String, &str)> = all_hz.iter().map(|hz| split_rate(*hz)).collect();
     let unit = split.last().map_or("", |last| last.1);
-    let one = |(value, own): &(String, &str)| {
-        if *own == unit {
-            value.clone()
-        } else {
-            format!("{value} {own}")
-        }
+    let one = |(value, own): &(String, &str)| match *own {
+        own if own == unit => value.clone(),
+        own => format!("{value} {own}"),
     };
     let mut parts: Vec<String> = split.iter().map(one).collect();
     if parts.len() > MOST_RATES {
@@ -240,17 +237,12 @@ pub fn offset(nanos: i64) -> String {
     let sign = if nanos < 0 { "-" } else { "" };
     let nanos = nanos.unsigned_abs();
     let second = nanos / 1_000_000_000;
-    let milli = nanos / 1_000_000 % 1000;
-    let fraction = if milli == 0 {
-        String::new()
-    } else {
-        format!(".{milli:03}").trim_end_matches('0').to_owned()
-    };
+    let fraction = format!(".{:03}", nanos / 1_000_000 % 1000);
+    let fraction = fraction.trim_end_matches('0').trim_end_matches('.');
     let (hour, minute, second) = (second / 3600, second / 60 % 60, second % 60);
-    if hour > 0 {
-        format!("{sign}{hour}:{minute:02}:{second:02}{fraction}")
-    } else {
-        format!("{sign}{minute:02}:{second:02}{fraction}")
+    match hour {
+        0 => format!("{sign}{minute:02}:{second:02}{fraction}"),
+        hour => format!("{sign}{hour}:{minute:02}:{second:02}{fraction}"),
     }
 }
 
@@ -269,10 +261,7 @@ pub fn offset_tenths(nanos: i64) -> String {
 /// A moment as [`offset`] writes it, without a leading zero: `3:20`, `0:38.5`, `1:02:03`.
 pub fn moment(nanos: i64) -> String {
     let text = offset(nanos);
-    match text.strip_prefix('0') {
-        Some(rest) => rest.to_owned(),
-        None => text,
-    }
+    text.strip_prefix('0').unwrap_or(&text).to_owned()
 }
 
 /// A moment as [`moment`] writes it, to the millisecond, after 20 s to the second: the last window, which ends 1 ns after

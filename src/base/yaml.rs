@@ -3,6 +3,8 @@
 #[cfg(feature = "render")]
 mod placed;
 
+use std::ops::Range;
+
 use serde::de::Deserialize;
 use serde_saphyr::{Error, Location};
 
@@ -106,9 +108,7 @@ fn mistake(text: &str, error: &Error) -> BadYaml {
 
 /// The key before a value, and both as written: `hz` and `hz: 5..4`. The key of a value in a list is empty.
 fn pair_at(text: &str, value: Location) -> (&str, &str) {
-    let span = value.span();
-    let [start, bytes] = [span.byte_offset(), span.byte_len()]
-        .map(|bytes| bytes.and_then(|n| usize::try_from(n).ok()).unwrap_or(0));
+    let Range { start, end } = bytes(value);
     let (Some(before), Some(from)) = (text.get(..start), text.get(start..)) else {
         return Default::default();
     };
@@ -124,12 +124,16 @@ fn pair_at(text: &str, value: Location) -> (&str, &str) {
         "" => start,
         key => before.rfind(key).unwrap_or(start),
     };
-    let pair = text.get(begin..start.saturating_add(bytes));
-    (
-        key,
-        pair.and_then(|pair| pair.lines().next())
-            .unwrap_or_default(),
-    )
+    let pair = text.get(begin..end).and_then(|pair| pair.lines().next());
+    (key, pair.unwrap_or_default())
+}
+
+/// The bytes of a value.
+fn bytes(location: Location) -> Range<usize> {
+    let span = location.span();
+    let [start, len] = [span.byte_offset(), span.byte_len()]
+        .map(|bytes| bytes.and_then(|n| usize::try_from(n).ok()).unwrap_or(0));
+    start..start.saturating_add(len)
 }
 
 /// A position in a document.
@@ -175,22 +179,16 @@ fn reason(error: &serde_saphyr::Error) -> String {
         return words.to_owned();
     }
     // The position is shown already: `error: line 2 column 2: …`.
-    let plain = match first
-        .strip_prefix("error: line ")
-        .and_then(|rest| rest.split_once(": "))
-    {
-        Some((_, plain)) => plain,
-        None => first,
-    };
+    let placed = first.strip_prefix("error: line ");
+    let placed = placed.and_then(|rest| rest.split_once(": "));
+    let plain = placed.map_or(first, |(_, plain)| plain);
     let twice = plain.strip_prefix("duplicate mapping key: ");
     if let Some((key, _)) = twice.and_then(|rest| rest.rsplit_once(", set ")) {
         return format!("the key `{key}` occurs twice; keep one of them");
     }
-    match plain.strip_prefix("unexpected character: `") {
-        Some(c) => format!(
-            "no value begins with `{}`; put it in quotes",
-            c.trim_end_matches('\'')
-        ),
+    let sign = plain.strip_prefix("unexpected character: `");
+    match sign.map(|sign| sign.trim_end_matches('\'')) {
+        Some(sign) => format!("no value begins with `{sign}`; put it in quotes"),
         None => plain.to_owned(),
     }
 }

@@ -71,10 +71,10 @@ pub(crate) fn explain(
         }
     }
     let window = |(at, differ): (usize, &Differing)| {
-        let mut list = Vec::new();
+        let mut list: Vec<(Change, EventId)> = Vec::new();
         if let Some(old) = at.checked_sub(1).map(|old| spans[old]) {
             let span = spans[at];
-            structure(differ, span, elements, &times, &mut list);
+            list.extend(times.changes(differ, span));
             let added = Span::new(old.end.max(span.start), span.end);
             list.extend(values(log, added));
         }
@@ -90,18 +90,22 @@ struct Differing {
     removed: Vec<Element>,
 }
 
-/// The times at which elements begin or end according to events, sorted.
-struct EventTimes {
-    begins: BTreeMap<Element, Vec<(Stamp, EventId)>>,
-    ends: BTreeMap<Element, Vec<(Stamp, EventId)>>,
+/// The events of each element with their times, sorted.
+type Timed = BTreeMap<Element, Vec<(Stamp, EventId)>>;
+
+/// The times at which elements begin or end according to events.
+struct EventTimes<'a> {
+    elements: &'a Elements,
+    begins: Timed,
+    ends: Timed,
     /// Unnamed publishers and their publications, with their topics: they appear and vanish with the topic.
     unnamed: BTreeMap<Element, Element>,
 }
 
-impl EventTimes {
-    fn new(log: &EventLog, elements: &Elements) -> Self {
-        let (mut begins, mut ends) = (BTreeMap::new(), BTreeMap::new());
-        let add = |to: &mut BTreeMap<Element, Vec<_>>, what, time, id| {
+impl<'a> EventTimes<'a> {
+    fn new(log: &EventLog, elements: &'a Elements) -> Self {
+        let (mut begins, mut ends) = (Timed::new(), Timed::new());
+        let add = |to: &mut Timed, what, time, id| {
             to.entry(what).or_default().push((time, id));
         };
         for (id, event) in log.events.with_ids() {
@@ -120,6 +124,7 @@ impl EventTimes {
             list.sort_unstable();
         }
         Self {
+            elements,
             begins,
             ends,
             unnamed: unnamed(elements),
@@ -127,16 +132,31 @@ impl EventTimes {
     }
 
     /// The last event of a list before `end`, else its first.
-    fn find(
-        &self,
-        list: &BTreeMap<Element, Vec<(Stamp, EventId)>>,
-        what: Element,
-        end: Stamp,
-    ) -> Option<(Stamp, EventId)> {
+    fn find(&self, list: &Timed, what: Element, end: Stamp) -> Option<(Stamp, EventId)> {
         let topic = || list.get(self.unnamed.get(&what)?);
         let list = list.get(&what).or_else(topic)?;
         let next = list.partition_point(|(time, _)| *time < end);
         list.get(next.saturating_sub(1)).copied()
+    }
+
+    /// The changes in which elements exist, of a window with this time.
+    fn changes(&self, differ: &Differing, span: Span) -> Vec<(Change, EventId)> {
+        let mut list = Vec::new();
+        for what in differ.added.iter().copied() {
+            let time = self.elements.seen(what).first;
+            if let Some((at, id)) = self.find(&self.begins, what, span.end) {
+                let mut times = [time, Some(at)].into_iter().flatten();
+                let time = times.find(|time| span.contains(*time));
+                list.push((Change::of([Kind::Started, Kind::Appeared], what, time), id));
+            }
+        }
+        for what in differ.removed.iter().copied() {
+            if let Some((at, id)) = self.find(&self.ends, what, span.end) {
+                let time = Some(at).filter(|at| *at < span.end);
+                list.push((Change::of([Kind::Stopped, Kind::Vanished], what, time), id));
+            }
+        }
+        list
     }
 }
 
@@ -151,30 +171,6 @@ fn unnamed(elements: &Elements) -> BTreeMap<Element, Element> {
         }
     }
     unnamed
-}
-
-fn structure(
-    differ: &Differing,
-    span: Span,
-    elements: &Elements,
-    times: &EventTimes,
-    list: &mut Vec<(Change, EventId)>,
-) {
-    for what in differ.added.iter().copied() {
-        let time = elements.seen(what).first.filter(|t| span.contains(*t));
-        if let Some((at, id)) = times.find(&times.begins, what, span.end) {
-            let time = time.or(Some(at).filter(|at| span.contains(*at)));
-            let change = Change::of([Kind::Started, Kind::Appeared], what, time);
-            list.push((change, id));
-        }
-    }
-    for what in differ.removed.iter().copied() {
-        if let Some((at, id)) = times.find(&times.ends, what, span.end) {
-            let time = Some(at).filter(|at| *at < span.end);
-            let change = Change::of([Kind::Stopped, Kind::Vanished], what, time);
-            list.push((change, id));
-        }
-    }
 }
 
 /// The changes of a window in events that are not about existence: rates, hand-overs, restarts, values.

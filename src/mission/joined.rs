@@ -23,9 +23,8 @@ impl Mission {
                 messages[at] = messages[at].saturating_add(window.messages);
                 for state in &graph.states {
                     let known = all[at].entry(state.what);
-                    known
-                        .and_modify(|known| join(known, state))
-                        .or_insert_with(|| state.clone());
+                    let known = known.and_modify(|known| join(known, state));
+                    known.or_insert_with(|| state.clone());
                 }
             }
         }
@@ -53,10 +52,8 @@ impl Mission {
 fn join(known: &mut ElementState, state: &ElementState) {
     known.state = known.state.min(state.state);
     known.confidence = known.confidence.min(state.confidence);
-    known.count = known
-        .count
-        .zip(state.count)
-        .map(|(a, b)| a.saturating_add(b));
+    let counts = known.count.zip(state.count);
+    known.count = counts.map(|(a, b)| a.saturating_add(b));
     known.hz = known.hz.zip(state.hz).map(|(a, b)| a.max(b));
     known.lifecycle.clone_from(&state.lifecycle);
 }

@@ -52,11 +52,10 @@ pub fn phases(elements: &Elements, sending: &Sending, whole: Span) -> Vec<Phase>
     let widths: Vec<i64> = cells.iter().map(Span::nanos).collect();
     let rows: Vec<Vec<bool>> = present.iter().map(|p| p.cells(&cells)).collect();
     let cuts = partition(&widths, &rows);
-    let starts: Vec<Stamp> = std::iter::once(whole.start)
-        .chain(cuts.into_iter().map(|at| cells[at].start))
-        .collect();
-    let of = |span: &Span| configuration(elements, sending, &present, *span);
-    let found: Vec<Configuration> = between(&starts, whole.end).iter().map(of).collect();
+    let mut starts = vec![whole.start];
+    starts.extend(cuts.into_iter().map(|at| cells[at].start));
+    let spans = between(&starts, whole.end);
+    let found = configurations(elements, sending, &present, &spans);
     let starts = boundaries(elements, &found, &starts, whole, is_topics(&present));
     let spans = between(&starts, whole.end);
     let (spans, found, ramps) = ramp::joined(&spans, &found, whole.nanos());
@@ -71,8 +70,7 @@ pub(crate) fn of_spans(
     spans: &[Span],
 ) -> Vec<Phase> {
     let present = presences(elements, sending, whole);
-    let of = |span: &Span| configuration(elements, sending, &present, *span);
-    let found: Vec<Configuration> = spans.iter().map(of).collect();
+    let found = configurations(elements, sending, &present, spans);
     reported(spans, &found, &vec![false; spans.len()], &present)
 }
 
@@ -83,18 +81,24 @@ fn cells(span: Span) -> Vec<Span> {
     every(span, step)
 }
 
-fn configuration(
+/// The configuration of each of these times.
+fn configurations(
     elements: &Elements,
     sending: &Sending,
     present: &[Presence],
-    span: Span,
-) -> Configuration {
+    spans: &[Span],
+) -> Vec<Configuration> {
     let topics = is_topics(present);
-    let there = present.iter().filter(|p| p.counts(topics) && p.fills(span));
-    Configuration {
-        names: there.map(|p| p.subject.name()).collect(),
-        senders: senders(elements, sending, span),
-    }
+    let of = |span: &Span| {
+        let there = present
+            .iter()
+            .filter(|p| p.counts(topics) && p.fills(*span));
+        Configuration {
+            names: there.map(|p| p.subject.name()).collect(),
+            senders: senders(elements, sending, *span),
+        }
+    };
+    spans.iter().map(of).collect()
 }
 
 /// The senders of more than half of a topic's messages in this time.
@@ -111,9 +115,8 @@ fn senders(elements: &Elements, sending: &Sending, span: Span) -> BTreeMap<Topic
                 *roles.entry(&node.role).or_default() += count;
             }
         }
-        let found = roles
-            .into_iter()
-            .find(|(_, n)| *n > 0.0 && *n * 2.0 > whole);
+        let is_main = |(_, n): &(&Arc<str>, f64)| *n > 0.0 && *n * 2.0 > whole;
+        let found = roles.into_iter().find(is_main);
         main.extend(found.map(|(role, _)| (of[0].topic, Arc::clone(role))));
     }
     main

@@ -9,9 +9,9 @@ use serde::de::{
     Deserialize, DeserializeSeed, Deserializer, IntoDeserializer as _, MapAccess, SeqAccess,
     Visitor,
 };
-use serde_saphyr::{Location, Spanned};
+use serde_saphyr::Spanned;
 
-use super::YamlPlace;
+use super::{YamlPlace, bytes};
 
 /// A value and its position in the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -155,13 +155,6 @@ pub(crate) struct YamlPair {
     /// The bytes of the key.
     pub(crate) bytes: Range<usize>,
     pub(crate) value: YamlNode,
-}
-
-fn bytes(location: Location) -> Range<usize> {
-    let span = location.span();
-    let [start, len] = [span.byte_offset(), span.byte_len()]
-        .map(|bytes| bytes.and_then(|n| usize::try_from(n).ok()).unwrap_or(0));
-    start..start.saturating_add(len)
 }
 
 impl<'de> Deserialize<'de> for YamlNode {

@@ -167,19 +167,17 @@ fn follow_inputs(context: &LogInput<'_>, wiring: &Wiring, drafts: &mut Drafts) {
         let inputs = own.iter().map(|node| &wiring.subscribed[*node]);
         let cause = inputs.flatten().find_map(|input| {
             if event.kind == Kind::Rate {
-                let of = steps.get(input).into_iter().flatten();
-                return of
-                    .copied()
-                    .find(|step| is_same_step(event, drafts.get(*step), CROWD_NS));
+                let mut of = steps.get(input).into_iter().flatten().copied();
+                return of.find(|step| is_same_step(event, drafts.get(*step), CROWD_NS));
             }
             let senders = wiring.publishers[*input].iter();
             let whose = senders.map(|node| Element::Node(*node));
-            let of = whose
-                .chain([Element::Topic(*input)])
-                .filter_map(|what| pauses.get(&what));
-            of.flatten()
-                .copied()
-                .find(|pause| follows(event, drafts.get(*pause)))
+            let whose = whose.chain([Element::Topic(*input)]);
+            let mut of = whose
+                .filter_map(|what| pauses.get(&what))
+                .flatten()
+                .copied();
+            of.find(|pause| follows(event, drafts.get(*pause)))
         });
         if let Some(cause) = cause {
             drafts.fold(id, cause);

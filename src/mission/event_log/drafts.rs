@@ -25,9 +25,8 @@ pub(super) struct Drafts {
 impl Drafts {
     /// Adds an event; returns its index. It is no part of a quiet one unless it is quiet too.
     pub(super) fn add(&mut self, mut event: Event) -> EventId {
-        event.part_of = event
-            .part_of
-            .filter(|whole| event.quiet || !self.get(*whole).quiet);
+        let may = |whole: &EventId| event.quiet || !self.get(*whole).quiet;
+        event.part_of = event.part_of.filter(may);
         self.list.push(event)
     }
 

@@ -149,9 +149,8 @@ fn shares(context: &LogInput<'_>, drafts: &mut Drafts, topic: TopicId, senders: 
     let mut before: Option<(NodeId, BTreeSet<NodeId>, Stamp)> = None;
     let between = cuts.windows(2);
     for pair in between.filter(|pair| pair[1].since(pair[0]) >= SHARE_HOLDS_NS) {
-        let inside = known
-            .iter()
-            .filter(|(_, s)| s.first <= pair[0] && pair[1] <= s.last);
+        let inside = known.iter();
+        let inside = inside.filter(|(_, s)| s.first <= pair[0] && pair[1] <= s.last);
         let rates: BTreeMap<NodeId, f64> = inside.map(|(node, s)| (*node, s.hz())).collect();
         let whole: f64 = rates.values().sum();
         let Some((main, _)) = rates.iter().find(|(_, hz)| **hz > whole / 2.0) else {

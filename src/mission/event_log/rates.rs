@@ -71,18 +71,15 @@ fn changes(before: &Stretch, after: &Stretch, share: f64) -> bool {
 /// Whether the sender restarted between the two.
 fn is_away(context: &LogInput<'_>, sender: &Sender, before: &Stretch, after: &Stretch) -> bool {
     let lives = context.lives(context.publication(sender)).iter();
-    !after.is_joined
-        && lives
-            .filter_map(|life| life.ended)
-            .any(|end| before.last <= end.latest && end.time <= after.first)
+    let mut ends = lives.filter_map(|life| life.ended);
+    !after.is_joined && ends.any(|end| before.last <= end.latest && end.time <= after.first)
 }
 
 impl LogInput<'_> {
     /// The publication of a sender; its topic if the sender is unknown.
     pub(super) fn publication(&self, sender: &Sender) -> Element {
-        let edge = sender
-            .node
-            .and_then(|node| self.elements.publication(node, sender.topic));
+        let edge = |node| self.elements.publication(node, sender.topic);
+        let edge = sender.node.and_then(edge);
         edge.map_or(Element::Topic(sender.topic), Element::Publish)
     }
 }

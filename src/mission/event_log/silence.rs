@@ -58,9 +58,8 @@ impl Gone {
     /// The event about the end of one of these senders at that time.
     fn at(&self, senders: &[&Sender], time: Stamp) -> Option<EventId> {
         let of = senders.iter().filter_map(|v| self.0.get(&v.node?));
-        of.flatten()
-            .find(|(end, _)| end.since(time).abs() <= TOGETHER_NS)
-            .map(|(_, id)| *id)
+        let is_near = |(end, _): &&(Stamp, EventId)| end.since(time).abs() <= TOGETHER_NS;
+        of.flatten().find(is_near).map(|(_, id)| *id)
     }
 }
 

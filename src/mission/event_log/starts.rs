@@ -12,18 +12,24 @@ use crate::base::time::{Span, Stamp};
 use crate::graph::history::{Bound, Life};
 use crate::graph::{Element, NodeId, TopicId};
 
-/// The events about starts and stops, by node and topic.
-#[derive(Default)]
-struct Wholes {
+/// The events about starts and stops in the making, by node and topic.
+struct Starts<'a, 'd> {
+    context: &'a LogInput<'a>,
+    drafts: &'d mut Drafts,
     nodes: BTreeMap<(NodeId, Kind), Vec<(Bound, EventId)>>,
     topics: BTreeMap<(TopicId, Kind, Stamp), EventId>,
 }
 
 /// Adds the events of all lifetimes.
 pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
-    let mut wholes = Wholes::default();
+    let mut starts = Starts {
+        context,
+        drafts,
+        nodes: BTreeMap::new(),
+        topics: BTreeMap::new(),
+    };
     for limits in limits_by_role(context).values() {
-        add_role(context, drafts, &mut wholes, limits);
+        starts.add_role(limits);
     }
     let elements = context.elements;
     let recorded = || {
@@ -32,16 +38,16 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     };
     for what in recorded() {
         if let (Some(node), Some(topic)) = elements.ends(what) {
-            add_edge(context, drafts, &mut wholes, what, (node, topic));
+            starts.add_edge(what, node, topic);
         }
     }
     for what in recorded() {
         let Element::Topic(id) = what else { continue };
         for (kind, at) in limits(context.lives(what)) {
             let mut event = context.event(of_edge(kind), what, at);
-            event.part_of = wholes.topics.get(&(id, kind, at.time)).copied();
+            event.part_of = starts.topics.get(&(id, kind, at.time)).copied();
             event.quiet |= event.part_of.is_none() && is_by_chance(context, id, kind, at.time);
-            drafts.add(event);
+            starts.drafts.add(event);
         }
     }
 }
@@ -121,62 +127,55 @@ fn limits_by_role<'a>(context: &LogInput<'a>) -> BTreeMap<&'a str, Vec<NodeLimit
     all
 }
 
-/// Adds the events of one role: an end followed by a beginning is a restart.
-fn add_role(
-    context: &LogInput<'_>,
-    drafts: &mut Drafts,
-    wholes: &mut Wholes,
-    mut limits: &[NodeLimit],
-) {
-    while let Some((one, after)) = limits.split_first() {
-        let is_back = |next: &&NodeLimit| (one.kind, next.kind) == (Kind::Stopped, Kind::Started);
-        let next = after.first().filter(is_back);
-        limits = &after[usize::from(next.is_some())..];
-        let kind = next.map_or(one.kind, |_| Kind::Restarted);
-        let mut event = context.event(kind, Element::Node(next.unwrap_or(one).node), one.at);
-        event.until = next.map(|next| next.at.time);
-        let id = drafts.add(event);
-        let is_other = next.is_some_and(|next| next.node != one.node);
-        for limit in [Some(one), next].into_iter().flatten() {
-            let of = wholes.nodes.entry((limit.node, limit.kind)).or_default();
-            of.push((limit.at, id));
-            if is_other {
-                let mut part = context.event(limit.kind, Element::Node(limit.node), limit.at);
-                part.part_of = Some(id);
-                drafts.add(part);
+impl Starts<'_, '_> {
+    /// Adds the events of one role: an end followed by a beginning is a restart.
+    fn add_role(&mut self, mut limits: &[NodeLimit]) {
+        let context = self.context;
+        while let Some((one, after)) = limits.split_first() {
+            let is_back =
+                |next: &&NodeLimit| (one.kind, next.kind) == (Kind::Stopped, Kind::Started);
+            let next = after.first().filter(is_back);
+            limits = &after[usize::from(next.is_some())..];
+            let kind = next.map_or(one.kind, |_| Kind::Restarted);
+            let mut event = context.event(kind, Element::Node(next.unwrap_or(one).node), one.at);
+            event.until = next.map(|next| next.at.time);
+            let id = self.drafts.add(event);
+            let is_other = next.is_some_and(|next| next.node != one.node);
+            for limit in [Some(one), next].into_iter().flatten() {
+                let of = self.nodes.entry((limit.node, limit.kind)).or_default();
+                of.push((limit.at, id));
+                if is_other {
+                    let mut part = context.event(limit.kind, Element::Node(limit.node), limit.at);
+                    part.part_of = Some(id);
+                    self.drafts.add(part);
+                }
             }
         }
     }
-}
 
-/// Adds the event of an edge: as a part of its node's event at that time, or alone.
-fn add_edge(
-    context: &LogInput<'_>,
-    drafts: &mut Drafts,
-    wholes: &mut Wholes,
-    what: Element,
-    (node, topic): (NodeId, TopicId),
-) {
-    for (kind, at) in limits(context.lives(what)) {
-        let of_node = wholes.nodes.get(&(node, kind)).into_iter().flatten();
-        // Near its node's start or stop, within the uncertainty.
-        let may = |node: &Bound| {
-            let since = node.time.plus(TOGETHER_NS);
-            kind == Kind::Started && at.earliest <= since && node.time <= at.time
-        };
-        let near = of_node
-            .map(|(node, id)| (at.time.since(node.time).abs(), node, *id))
-            .filter(|(far, node, _)| *far <= TOGETHER_NS || may(node))
-            .min_by_key(|(far, _, _)| *far)
-            .map(|(_, _, id)| id);
-        let mut event = context.event(of_edge(kind), what, at);
-        event.part_of = near;
-        let id = drafts.add(event);
-        let whole = near.unwrap_or(id);
-        let of_topic = wholes.topics.entry((topic, kind, at.time)).or_insert(whole);
-        // One that is shown.
-        if drafts.get(*of_topic).quiet {
-            *of_topic = whole;
+    /// Adds the event of an edge: as a part of its node's event at that time, or alone.
+    fn add_edge(&mut self, what: Element, node: NodeId, topic: TopicId) {
+        for (kind, at) in limits(self.context.lives(what)) {
+            let of_node = self.nodes.get(&(node, kind)).into_iter().flatten();
+            // Near its node's start or stop, within the uncertainty.
+            let may = |node: &Bound| {
+                let since = node.time.plus(TOGETHER_NS);
+                kind == Kind::Started && at.earliest <= since && node.time <= at.time
+            };
+            let near = of_node
+                .map(|(node, id)| (at.time.since(node.time).abs(), node, *id))
+                .filter(|(far, node, _)| *far <= TOGETHER_NS || may(node))
+                .min_by_key(|(far, _, _)| *far)
+                .map(|(_, _, id)| id);
+            let mut event = self.context.event(of_edge(kind), what, at);
+            event.part_of = near;
+            let id = self.drafts.add(event);
+            let whole = near.unwrap_or(id);
+            let of_topic = self.topics.entry((topic, kind, at.time)).or_insert(whole);
+            // One that is shown.
+            if self.drafts.get(*of_topic).quiet {
+                *of_topic = whole;
+            }
         }
     }
 }

@@ -70,26 +70,17 @@ fn ros2(info: &Info) -> Vec<String> {
 fn from_files(info: &Info) -> Vec<String> {
     let mut advice = Vec::new();
     let named = info.nodes_by_degree.total();
-    let is_read = !info.undrawn.is_empty()
-        || info
-            .evidence
-            .iter()
-            .any(|row| row.source.starts_with("source"));
+    let has = |is_it: fn(&str) -> bool| info.evidence.iter().any(|row| is_it(row.source));
+    let is_read = !info.undrawn.is_empty() || has(|source| source.starts_with("source"));
     if named > 0 && !is_read && Evidence::all_words().any(|word| word == "source") {
         advice.push(format!(
             "`--source FOLDER` adds what the source code of the {named} named nodes declares"
         ));
     }
-    if info
-        .evidence
-        .iter()
-        .any(|row| ["topology", "launch"].contains(&row.source))
-    {
-        return advice;
+    if !has(|source| ["topology", "launch"].contains(&source)) {
+        let text =
+            "`--topology FILE` adds a launch file, a graph saved by rqt_graph, or a table of nodes";
+        advice.push(text.to_owned());
     }
-    advice.push(
-        "`--topology FILE` adds a launch file, a graph saved by rqt_graph, or a table of nodes"
-            .to_owned(),
-    );
     advice
 }

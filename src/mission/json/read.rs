@@ -82,9 +82,8 @@ fn mission_of(mut raw: Raw) -> Result<Mission, String> {
     let end = spans.iter().map(|s| s.end).max().unwrap_or_default();
     let longest = spans.iter().map(Span::nanos).max().unwrap_or(1).max(1);
     let period = raw.period_ns.and_then(Period::from_nanos);
-    let period = period
-        .or_else(|| Period::from_nanos(longest))
-        .ok_or("its windows have no length")?;
+    let period = period.or_else(|| Period::from_nanos(longest));
+    let period = period.ok_or("its windows have no length")?;
     let windows = raw.windows.iter().zip(&spans).enumerate();
     let windows = windows.map(|(index, (window, span))| Window {
         index,
@@ -98,10 +97,10 @@ fn mission_of(mut raw: Raw) -> Result<Mission, String> {
     let messages = messages.fold(0, u64::saturating_add);
     let mut mission = Mission {
         bags: raw.bags.into_iter().map(report).collect(),
-        span: Span::new(
-            raw.start_ns.unwrap_or(start).min(start),
-            raw.end_ns.unwrap_or(end).max(end),
-        ),
+        span: Span::new(start, end).hull(Span::new(
+            raw.start_ns.unwrap_or(start),
+            raw.end_ns.unwrap_or(end),
+        )),
         messages: raw.messages.unwrap_or(messages),
         period,
         step: raw.step_ns.and_then(Period::from_nanos).unwrap_or(period),
@@ -212,10 +211,8 @@ impl Listed {
         let named = named.map(|one| (&one.topic, Some(&one.node), &one.sender));
         let mut all: BTreeMap<(TopicId, Option<NodeId>), Sender> = BTreeMap::new();
         for (name, node, sender) in unnamed.chain(named) {
-            let Some(topic) = elements
-                .topic(name)
-                .filter(|_| !sender.stretches.is_empty())
-            else {
+            let topic = elements.topic(name);
+            let Some(topic) = topic.filter(|_| !sender.stretches.is_empty()) else {
                 continue;
             };
             let is_whole = |s: &Stretch| s.first <= s.last && s.count > 0 && s.period >= 0;

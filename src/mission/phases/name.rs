@@ -66,11 +66,8 @@ impl<'a> PhaseNames<'a> {
 /// The namespace that begins as a whole, if all that is added is in one in which nothing was before: `robot2`.
 fn began(before: &Existing, added: &[&Arc<str>]) -> Option<String> {
     let first = namespace(added.first()?);
-    let end = first
-        .match_indices('/')
-        .nth(1)
-        .map_or(first.len(), |at| at.0);
-    let space = &first[..end];
+    let end = first.match_indices('/').nth(1);
+    let space = end.map_or(first, |(at, _)| &first[..at]);
     let all_in = added.iter().all(|name| lies_in(name, space));
     let is_new = !before.iter().any(|name| lies_in(name, space));
     (space.len() > 1 && added.len() > 1 && all_in && is_new).then(|| space[1..].to_owned())

@@ -22,12 +22,10 @@ pub(crate) fn partition(widths: &[i64], present: &[Vec<bool>]) -> Vec<usize> {
     }
     let rows = rows(widths, present);
     let whole = i128::from(at[n]).max(1);
-    let total: i128 = rows
-        .iter()
-        .map(|(sums, many)| i128::from(sums[n]) * many)
-        .sum();
+    let total = rows.iter();
+    let total = total.map(|(sums, many)| i128::from(sums[n]) * many);
     // The mean number of elements times the mission's length is their total presence.
-    let price = total.max(FEWEST * whole) / PRICE;
+    let price = total.sum::<i128>().max(FEWEST * whole) / PRICE;
     let shortest = at[n] / SHORTEST;
     let cost = |from: usize, to: usize| -> i128 {
         let length = at[to] - at[from];

@@ -77,9 +77,8 @@ impl Presence {
 
 /// Whether phases are detected from topics.
 pub(crate) fn is_topics(present: &[Presence]) -> bool {
-    present
-        .iter()
-        .any(|p| matches!(p.subject, PresentThing::Topic(_)))
+    let mut subjects = present.iter().map(|p| &p.subject);
+    subjects.any(|subject| matches!(subject, PresentThing::Topic(_)))
 }
 
 /// Every element's presence, sorted: nodes by role and their publications that carry messages; topics with messages
@@ -98,10 +97,8 @@ pub(crate) fn presences(elements: &Elements, sending: &Sending, whole: Span) -> 
         subject,
         spans: Span::joined(spans, most),
     };
-    let there = all.into_iter().map(presence);
-    there
-        .filter(|p| p.spans.iter().any(|s| s.shared(whole) > 0))
-        .collect()
+    let is_there = |p: &Presence| p.spans.iter().any(|s| s.shared(whole) > 0);
+    all.into_iter().map(presence).filter(is_there).collect()
 }
 
 /// The times in which a topic, or a publication with messages, is active: its lifetime without silences.
@@ -110,10 +107,8 @@ fn sent(elements: &Elements, sending: &Sending, what: Element) -> Vec<Span> {
     let Element::Publish(_) = what else {
         let topic = elements.ends(what).1;
         let senders = topic.map_or(&[][..], |topic| sending.of_topic(topic));
-        return senders
-            .iter()
-            .flat_map(|s| s.stretches.iter().map(stretch))
-            .collect();
+        let stretches = senders.iter().flat_map(|s| &s.stretches);
+        return stretches.map(stretch).collect();
     };
     let (Some(node), Some(topic)) = elements.ends(what) else {
         return Vec::new();
