@@ -26,9 +26,9 @@ use std::path::Path;
 use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, ValueEnum};
 
 use crate::base::error::Error;
+use crate::base::notice::Notices;
 use crate::base::words::visible;
 use crate::cli::terminal::{Terminal, has_colour, print_usage};
-use crate::mission::Mission;
 use applies::Given;
 
 /// The version, and in packages the commit that they were built from: `0.1.0 (1a2b3c4d5e 2026-11-23)`.
@@ -205,9 +205,8 @@ fn parsed<T: Into<OsString> + Clone>(
 /// Prints the help, the version, or the error of the command line, with control characters escaped so that no argument
 /// can control the terminal.
 fn untyped(args: &[OsString], error: clap::Error) -> u8 {
-    let shown = args
-        .iter()
-        .map(|arg| visible(&arg.to_string_lossy()).into_owned());
+    let shown = args.iter();
+    let shown = shown.map(|arg| visible(&arg.to_string_lossy()).into_owned());
     let colour = if has_colour(asked_colour(args), error.use_stderr()) {
         ColorChoice::Always
     } else {
@@ -242,11 +241,8 @@ fn asked_colour(args: &[OsString]) -> Colour {
     Colour::from_str(&value, true).unwrap_or_default()
 }
 
-/// The exit code for a mission.
-fn code(mission: &Mission) -> u8 {
-    if mission.notices.any_loss() {
-        SKIPPED
-    } else {
-        DONE
-    }
+/// The exit code for work with these notices.
+fn code(notices: &Notices) -> u8 {
+    let is_loss = notices.any_loss();
+    if is_loss { SKIPPED } else { DONE }
 }

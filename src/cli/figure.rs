@@ -81,7 +81,7 @@ pub(super) fn figure(args: &FigureArgs, given: &Given, terminal: &mut Terminal) 
     // A figure shows continuous time, independent of windows.
     terminal.notices(&done.notices.without(NoticeKind::Chosen));
     wrote(&done, "", terminal);
-    Ok(code(&done.mission))
+    Ok(code(&done.mission.notices))
 }
 
 /// The job of `figure`.

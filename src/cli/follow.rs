@@ -241,12 +241,14 @@ impl Follower<'_> {
         if !job.outputs.is_empty() {
             let rendered = crate::pipeline::render(&job, terminal)?;
             render::report(&rendered, terminal);
-            done = code(&rendered.mission);
+            done = code(&rendered.mission.notices);
         }
         let Some(expect) = &self.args.expect else {
             return Ok(done);
         };
         let format = (self.args.format == LogFormat::Text).then_some(&FORMATS[0]);
-        gate::judge_closed(job.reading, &self.args.what, expect, format, terminal)
+        let mut check = gate::job(job.reading, expect.clone());
+        check.bags = vec![self.args.what.display().to_string()];
+        gate::verdict(&check, format, terminal)
     }
 }

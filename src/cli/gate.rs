@@ -164,14 +164,14 @@ pub(super) fn diff(args: &DiffArgs, given: &Given, terminal: &mut Terminal) -> R
     for remark in &done.remarks {
         terminal.note(remark);
     }
-    terminal.notices(&notices(&done.missions));
+    let notices = notices(&done.missions);
+    terminal.notices(&notices);
     let reports = job.reports.iter().map(|report| &report.target);
     let targets = reports.chain(job.pictures.iter().map(|picture| &picture.target));
     let what = words::count(done.differences.len(), "difference");
     wrote(targets, &what, terminal);
     let is_different = done.differences.iter().any(|d| d.is_known);
-    let worst = done.missions.iter().map(code).max().unwrap_or(DONE);
-    Ok(if is_different { FAILED } else { worst })
+    Ok(if is_different { FAILED } else { code(&notices) })
 }
 
 /// Prints a report; only text fits the terminal.
@@ -250,7 +250,8 @@ pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Termin
         terminal.make_room();
     }
     let done = pipeline::baseline(&job, terminal)?;
-    terminal.notices(&notices(&done.missions));
+    let notices = notices(&done.missions);
+    terminal.notices(&notices);
     if done.left_out > 0 {
         let names = words::count(done.left_out, "name");
         terminal.note(&format!(
@@ -268,8 +269,7 @@ pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Termin
         let what = counts.map(|(count, word)| words::count(count, word));
         wrote([&job.output].into_iter(), &what.join(", "), terminal);
     }
-    let codes = done.missions.iter().map(code);
-    Ok(codes.max().unwrap_or(DONE))
+    Ok(code(&notices))
 }
 
 /// Checks a mission against an expectation.
@@ -281,8 +281,7 @@ pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) ->
     }
     // Given, unless a kind is explained.
     let expect = args.expect.clone().unwrap_or_default();
-    let mut job = Check::new(judged(&args.bags, args.range, &args.graph)?, expect);
-    track(&mut job);
+    let mut job = job(judged(&args.bags, args.range, &args.graph)?, expect);
     let reports = args.outputs.iter().map(|output| report(output));
     job.reports = reports.collect::<Result<_>>()?;
     job.is_strict = args.undecidable == Undecidable::Error;
@@ -292,22 +291,12 @@ pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) ->
     verdict(&job, Some(args.format), terminal)
 }
 
-/// Checks the closed recording that was followed as `what`; prints the findings if a format is given.
-pub(super) fn judge_closed(
-    reading: Reading,
-    what: &Path,
-    expect: &Path,
+/// Runs the check, prints the findings if a format is given, and returns the exit code.
+pub(super) fn verdict(
+    job: &Check,
     format: Option<&ReportFormat>,
     terminal: &mut Terminal,
 ) -> Result<u8> {
-    let mut job = Check::new(reading, expect);
-    track(&mut job);
-    job.bags = vec![what.display().to_string()];
-    verdict(&job, format, terminal)
-}
-
-/// Runs the check, prints the findings if a format is given, and returns the exit code.
-fn verdict(job: &Check, format: Option<&ReportFormat>, terminal: &mut Terminal) -> Result<u8> {
     let done = pipeline::check(job, terminal)?;
     if let Some(format) = format {
         print(&job.report(&done, format), format.word, terminal)?;
@@ -322,7 +311,7 @@ fn verdict(job: &Check, format: Option<&ReportFormat>, terminal: &mut Terminal) 
     let what = words::count(findings, "finding");
     let targets = job.reports.iter().map(|report| &report.target);
     wrote(targets, &what, terminal);
-    Ok(match code(&done.mission) {
+    Ok(match code(&done.mission.notices) {
         _ if verdict.count(Severity::Error) > 0 => FAILED,
         _ if verdict.is_blind() => USAGE,
         SKIPPED => SKIPPED,
@@ -330,22 +319,21 @@ fn verdict(job: &Check, format: Option<&ReportFormat>, terminal: &mut Terminal) 
     })
 }
 
-/// Makes the path of the expectations file relative to the root of its repository, with slashes: the checkout of a
-/// GitHub or GitLab job, else the nearest folder with `.git`. Unchanged outside a repository.
-fn track(job: &mut Check) {
-    let Ok(whole) = job.expect.canonicalize() else {
-        return;
-    };
+/// The check against an expectations file. Reports name it by its path from the root of its repository, with slashes: the
+/// checkout of a GitHub or GitLab job, else the nearest folder with `.git`; as given outside a repository.
+pub(super) fn job(reading: Reading, expect: PathBuf) -> Check {
+    let whole = expect.canonicalize().unwrap_or_default();
     let checkouts = ["GITHUB_WORKSPACE", "CI_PROJECT_DIR"];
     let named = checkouts.iter().filter_map(std::env::var_os);
     let named = named.filter_map(|root| PathBuf::from(root).canonicalize().ok());
     let found = whole.ancestors().skip(1);
     let found = found.filter(|folder| folder.join(".git").exists());
     let mut roots = named.chain(found.map(Path::to_owned));
+    let mut job = Check::new(reading, expect);
     if let Some(below) = roots.find_map(|root| Some(whole.strip_prefix(root).ok()?.to_owned())) {
-        let parts = below.iter().map(|part| part.to_string_lossy());
-        job.tracked = parts.collect::<Vec<_>>().join("/");
+        job.tracked = words::joined(below.iter().map(|part| part.to_string_lossy()), "/");
     }
+    job
 }
 
 /// The reading for a check. Missions in JSON have their own windows.

@@ -68,9 +68,8 @@ impl Typed {
                 let id = arg.get_id().to_string();
                 let has = |ids: &str| ids.split(' ').any(|known| known == id);
                 let heading = HEADINGS.iter().find(|(_, ids)| has(ids));
-                let lists_values = arg
-                    .get_value_names()
-                    .is_some_and(|names| names.iter().any(|name| name.contains(['|', ','])));
+                let mut names = arg.get_value_names().into_iter().flatten();
+                let lists_values = names.any(|name| name.contains(['|', ',']));
                 let arg = arg.hide_possible_values(lists_values);
                 match heading {
                     Some((heading, _)) if !arg.is_positional() => arg.help_heading(*heading),
@@ -86,9 +85,9 @@ fn examples(command: Command, text: &str) -> Command {
     let examples = format!("Examples:{text}");
     let more = command.get_after_long_help().or(command.get_after_help());
     // With its escape sequences: one of them keeps `{n}` as it is.
-    let long = more.map_or_else(
-        || examples.clone(),
-        |more| format!("{examples}\n\n{}", more.ansi()),
-    );
+    let long = match more {
+        Some(more) => format!("{examples}\n\n{}", more.ansi()),
+        None => examples.clone(),
+    };
     command.after_help(examples).after_long_help(long)
 }

@@ -159,10 +159,7 @@ const OUTPUT: &str = "Output file; the extension selects the format, `{n}` write
 pub(super) fn outputs_help() -> String {
     let rows = FORMATS.iter();
     let rows = rows.map(|f| format!("  .{:<6} {}", f.word, f.what));
-    shown(&format!(
-        "Outputs, by extension:\n{}",
-        words::joined(rows, "\n")
-    ))
+    shown(&("Outputs, by extension:\n".to_owned() + &words::joined(rows, "\n")))
 }
 
 /// A help text that shows `{n}` literally: clap would replace it by a line break, so an escape sequence that has no effect
@@ -184,7 +181,7 @@ pub(super) fn render(args: &RenderArgs, given: &Given, terminal: &mut Terminal) 
     make_room(&job, terminal);
     let done = crate::pipeline::render(&job, terminal)?;
     report(&done, terminal);
-    Ok(code(&done.mission))
+    Ok(code(&done.mission.notices))
 }
 
 /// Hides the progress if an output is standard output.

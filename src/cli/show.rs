@@ -61,10 +61,8 @@ impl InfoFormat {
     /// # Errors
     /// If this build does not write it.
     fn file(self, rows: &[SurveyRow], is_survey: bool, width: Option<usize>) -> Result<Vec<u8>> {
-        let one = rows
-            .first()
-            .and_then(|row| row.info.as_ref())
-            .filter(|_| !is_survey);
+        let one = rows.first().filter(|_| !is_survey);
+        let one = one.and_then(|row| row.info.as_ref());
         Ok(match (self, one) {
             (Self::Text, Some(one)) => text(one, width).into_bytes(),
             (Self::Text, None) => survey_text(rows, width).into_bytes(),
@@ -179,16 +177,12 @@ pub(super) fn events(args: &EventsArgs, given: &Given, terminal: &mut Terminal) 
     reading.phases.clone_from(&args.phases);
     applies::check_inputs(given, &reading)?;
     if args.graph.source.is_some() {
-        terminal
-            .note("elements that only source code declares have no times and are not in the log");
+        let text = "elements that only source code declares have no times and are not in the log";
+        terminal.note(text);
     }
     let hint = "write `x.txt`, `x.csv`, `x.ndjson`, `x.json` or `x.md`";
-    let outputs = outputs(
-        (&args.outputs, args.format),
-        LogFormat::from_word,
-        hint,
-        &reading,
-    )?;
+    let given_outputs = (&args.outputs[..], args.format);
+    let outputs = outputs(given_outputs, LogFormat::from_word, hint, &reading)?;
     let mut logs = Logs {
         options: LogOptions {
             parts: args.parts,
@@ -227,11 +221,7 @@ pub(super) fn events(args: &EventsArgs, given: &Given, terminal: &mut Terminal) 
     let targets = logs.outputs.iter().map(|(target, _)| target);
     wrote(targets, "the event log", terminal);
     terminal.notices(&logs.notices);
-    Ok(if logs.notices.any_loss() {
-        SKIPPED
-    } else {
-        DONE
-    })
+    Ok(code(&logs.notices))
 }
 
 /// The folder of bags that is the only input, if it is.
@@ -265,7 +255,7 @@ pub(super) fn info_of(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -
         let (mission, pieces) = explain(&reading, terminal)?;
         terminal.fitted(&why(&mission, &args.why, &pieces)?)?;
         terminal.notices(&mission.notices);
-        return Ok(code(&mission));
+        return Ok(code(&mission.notices));
     }
     let (rows, notices, code) = if let Some(folder) = folder {
         let Survey { rows, skipped } = survey(folder, &reading, terminal)?;
@@ -275,7 +265,7 @@ pub(super) fn info_of(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -
         let bag = mission.bags.first();
         let name = bag.map_or_else(String::new, |bag| bag.name.clone());
         let row = SurveyRow::of(name, &mission);
-        (vec![row], mission.notices.clone(), code(&mission))
+        (vec![row], mission.notices.clone(), code(&mission.notices))
     };
     for (target, format) in &outputs {
         let width = terminal.width().filter(|_| *target == Target::Stdout);
@@ -288,11 +278,8 @@ pub(super) fn info_of(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -
             (file, _) => put(file, &bytes)?,
         }
     }
-    wrote(
-        outputs.iter().map(|(target, _)| target),
-        "the summary",
-        terminal,
-    );
+    let targets = outputs.iter().map(|(target, _)| target);
+    wrote(targets, "the summary", terminal);
     terminal.notices(&notices);
     Ok(code)
 }

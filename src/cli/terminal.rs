@@ -301,9 +301,8 @@ fn print(bytes: &[u8]) -> Result<bool> {
     let mut out = io::stdout().lock();
     match out.write_all(bytes).and_then(|()| out.flush()) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(false),
-        other => other
-            .map(|()| true)
-            .map_err(Error::io("write", Path::new("standard output"))),
+        Err(error) => Err(Error::io("write", Path::new("standard output"))(error)),
+        Ok(()) => Ok(true),
     }
 }
 

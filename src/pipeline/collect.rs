@@ -140,9 +140,8 @@ fn once(
     let notices = all.iter().zip(&inputs);
     let notices = notices.filter_map(|(bag, input)| twice_recorded(bag.left_out, input));
     recorded.notices.extend(notices);
-    let falls = seams
-        .iter()
-        .flat_map(|seams| straight::falls(seams, !is_pipe));
+    let falls = seams.iter();
+    let falls = falls.flat_map(|seams| straight::falls(seams, !is_pipe));
     let is_kept = |fall: &ClockFall| recorded.span.is_some_and(|span| span.contains(fall.time));
     recorded.falls = falls.filter(is_kept).collect();
     recorded.falls.sort_unstable();

@@ -43,10 +43,9 @@ impl Composed {
     pub(super) fn outline(mission: &Mission, options: ViewOptions, page: PageOptions) -> Self {
         Self {
             view: outline(mission, &options),
-            notices: Notices::new(),
             options,
             page,
-            layout: Layout::default(),
+            ..Self::default()
         }
     }
 
@@ -63,13 +62,12 @@ impl Composed {
     /// The positions, for the JSON.
     pub(super) fn places(&self) -> Places {
         let boxes = self.view.items.iter().zip(&self.layout.boxes);
-        let mut boxes: Vec<Place> = boxes
-            .map(|(item, rect)| Place {
-                what: item.kind.word().to_owned(),
-                name: item.name.to_string(),
-                rect: *rect,
-            })
-            .collect();
+        let boxes = boxes.map(|(item, rect)| Place {
+            what: item.kind.word().to_owned(),
+            name: item.name.to_string(),
+            rect: *rect,
+        });
+        let mut boxes: Vec<Place> = boxes.collect();
         boxes.sort_by(|a, b| (&a.what, &a.name).cmp(&(&b.what, &b.name)));
         Places {
             width: self.layout.size.w,
@@ -122,9 +120,8 @@ impl Drawing {
 /// The position of each item in an earlier drawing; `None` for new ones.
 fn known(view: &View, kept: &Places) -> Vec<Option<Rect>> {
     let boxes = kept.boxes.iter();
-    let places: BTreeMap<(&str, &str), Rect> = boxes
-        .map(|b| ((b.what.as_str(), b.name.as_str()), b.rect))
-        .collect();
+    let places = boxes.map(|b| ((b.what.as_str(), b.name.as_str()), b.rect));
+    let places: BTreeMap<(&str, &str), Rect> = places.collect();
     let items = view.items.iter();
     let place = |item: &Item| places.get(&(item.kind.word(), &*item.name)).copied();
     items.map(place).collect()

@@ -272,14 +272,12 @@ fn parts<'a>(
     }
     let ends: Vec<Stamp> = changes.keys().skip(1).copied().collect();
     let mut here = BTreeSet::new();
-    let parts = changes
-        .into_iter()
-        .zip(ends)
-        .map(|((start, changed), end)| {
-            here = &here ^ &changed;
-            (Span::new(start, end), here.clone())
-        });
-    parts.collect()
+    let parts = changes.into_iter().zip(ends);
+    let part = |((start, changed), end)| {
+        here = &here ^ &changed;
+        (Span::new(start, end), here.clone())
+    };
+    parts.map(part).collect()
 }
 
 /// The messages that are left out: whenever several bags recorded a topic of one robot, those of all but the one with most of them then.
@@ -416,20 +414,17 @@ pub(super) fn apart(
     let given = given_offset(reading, &inputs[offset.bag]).unwrap_or(0);
     let seconds = given.saturating_sub(offset.ahead) as f64 / 1e9;
     let length = words::duration(offset.ahead.saturating_abs());
-    let side = if offset.ahead > 0 {
-        "ahead of"
-    } else {
-        "behind"
-    };
-    let (why, then) = match offset.messages {
-        0 => (
-            "their first messages".to_owned(),
-            "puts these together, if they are of one run",
-        ),
-        many => (
-            words::count(many, "message") + " that both recorded",
-            "corrects it",
-        ),
+    let is_ahead = offset.ahead > 0;
+    let side = if is_ahead { "ahead of" } else { "behind" };
+    let (kind, why, then) = match offset.messages {
+        0 => {
+            let then = "puts these together, if they are of one run";
+            (NoticeKind::Apart, "their first messages".to_owned(), then)
+        }
+        many => {
+            let why = words::count(many, "message") + " that both recorded";
+            (NoticeKind::Note, why, "corrects it")
+        }
     };
     let then = if is_corrected {
         format!("corrected; `--offset {own}=0s` leaves its times as they are")
@@ -438,9 +433,5 @@ pub(super) fn apart(
     };
     let text =
         format!("the clock of `{own}` is {length} {side} that of `{other}` by {why}: {then}");
-    let kind = match offset.messages {
-        0 => NoticeKind::Apart,
-        _ => NoticeKind::Note,
-    };
     Notice::new(kind, text)
 }

@@ -89,9 +89,8 @@ impl Drawing {
 
     /// The smallest legible text, in pixels.
     pub(super) fn readable(&self) -> f64 {
-        self.medium
-            .as_ref()
-            .map_or(SMALLEST, |medium| medium.readable)
+        let medium = self.medium.as_ref();
+        medium.map_or(SMALLEST, |medium| medium.readable)
     }
 }
 

@@ -160,9 +160,8 @@ fn of_steps(sheet: &FigureSheet<'_>, drawing: &Drawing) -> Result<Scene> {
     let mission = source.mission.joined(&middles);
     let drawing = on_paper(sheet, drawing, sheet.options.width_mm);
     let whole = Composed::new(&mission, drawing.view.clone(), drawing.page.clone());
-    let all: Vec<(usize, News)> = (1..many)
-        .filter_map(|k| Some((k, whole.view.news(k - 1 + base)?)))
-        .collect();
+    let all = (1..many).filter_map(|k| Some((k, whole.view.news(k - 1 + base)?)));
+    let all: Vec<(usize, News)> = all.collect();
     let mut chosen = chosen(sheet, &all)?;
     let mm = sheet.options.width_mm;
     let picture = |(at, (_, news)): (usize, &(usize, News))| {
@@ -269,10 +268,8 @@ fn narrow(drawing: &Drawing, view: &View, width: f64) -> Option<Scene> {
     let layouts = drawing.of_shapes(any.plan(), &page, &SHAPES).into_iter();
     let fitting = layouts.filter(|layout| layout.size.w <= room);
     let layout = fitting.min_by(|a, b| a.size.h.total_cmp(&b.size.h))?;
-    let size = Size::new(
-        layout.size.w * scale + 2.0 * margin,
-        layout.size.h * scale + 2.0 * margin,
-    );
+    let [w, h] = [layout.size.w, layout.size.h].map(|side| side * scale + 2.0 * margin);
+    let size = Size::new(w, h);
     Some(measured(size).with(layout).scene(0))
 }
 

@@ -148,9 +148,7 @@ impl Follow {
         reading.division.length = length;
         // Times of events count from the first message; only the kept time is divided into windows.
         let start = match length {
-            Length::All => self
-                .origin
-                .map_or(span.start, |origin| origin.min(span.start)),
+            Length::All => self.origin.map_or(span.start, |at| at.min(span.start)),
             _ => span.start.max(from),
         };
         let collected = Collected {

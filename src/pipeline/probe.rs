@@ -26,9 +26,8 @@ pub(super) fn probe(
     for (bag, input) in inputs.iter().enumerate() {
         let streams = &collected.recorded.streams;
         let of_bag = messages.iter().filter(|(at, _)| streams[*at].bag == bag);
-        let mut wanted: Vec<(Stamp, usize, ConnectionId)> = of_bag
-            .map(|(at, time)| (*time, *at, streams[*at].connection.id))
-            .collect();
+        let wanted = of_bag.map(|(at, time)| (*time, *at, streams[*at].connection.id));
+        let mut wanted: Vec<(Stamp, usize, ConnectionId)> = wanted.collect();
         if wanted.is_empty() || input.is_pipe() {
             continue;
         }

@@ -130,10 +130,8 @@ pub fn read(reading: &Reading, watch: &mut dyn Watch) -> Result<Mission> {
 pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Mission, Vec<EvidenceLine>)> {
     let pipe = reading.inputs.iter().find(|input| input.is_pipe());
     if let Some(pipe) = pipe.filter(|_| reading.verify) {
-        let what = format!(
-            "`--verify` reads a bag twice, but {} can be read only once",
-            pipe.name()
-        );
+        let pipe = pipe.name();
+        let what = format!("`--verify` reads a bag twice, but {pipe} can be read only once");
         return Err(Error::usage(what, "save the bag to a file first"));
     }
     watch.stage(Stage::Read);
@@ -197,8 +195,8 @@ pub(super) fn so_far(collected: &Collected, reading: &Reading) -> Result<Mission
     mission(collected, &findings, history, None, reading)
 }
 
-/// Checks a mission in JSON against the limits of bags; returns the reason and a hint if it exceeds one.
-fn bounded(mission: &Mission) -> std::result::Result<(), (String, &'static str)> {
+/// The limit of bags that a mission in JSON exceeds, if any, and a hint.
+fn excess(mission: &Mission) -> Option<(String, &'static str)> {
     let many = i64::try_from(mission.windows.len()).unwrap_or(i64::MAX);
     let elements = &mission.elements;
     let nodes = elements.nodes.iter().map(|node| node.name.as_str());
@@ -209,19 +207,17 @@ fn bounded(mission: &Mission) -> std::result::Result<(), (String, &'static str)>
     if mission.span.nanos() / DAY >= budget::SPAN_DAYS {
         let days = budget::SPAN_DAYS;
         let reason = format!("its windows cover more than {days} days");
-        Err((reason, "times are nanoseconds since 1970"))
+        Some((reason, "times are nanoseconds since 1970"))
     } else if many > budget::WINDOWS {
         let reason = format!("{many} windows are more than {}", budget::WINDOWS);
-        Err((
-            reason,
-            "generate it again from the bag with a longer `--period`",
-        ))
+        let hint = "generate it again from the bag with a longer `--period`";
+        Some((reason, hint))
     } else if longest > budget::NAME || lengths.len() > budget::NAMES || whole > budget::NAMES_BYTES
     {
         let reason = "its names are too many or too long".to_owned();
-        Err((reason, "such names are not valid"))
+        Some((reason, "such names are not valid"))
     } else {
-        Ok(())
+        None
     }
 }
 
@@ -229,7 +225,7 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
     let text = file::read_text(path, budget::MISSION_JSON)?;
     let mut mission = read_json(&text, path)?;
     drop(text);
-    if let Err((reason, hint)) = bounded(&mission) {
+    if let Some((reason, hint)) = excess(&mission) {
         return Err(Error::bad_file(path, 0, reason, hint));
     }
     if !mission.knows_lives() {

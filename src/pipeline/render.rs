@@ -95,11 +95,9 @@ pub(crate) fn check(job: &Render) -> Result<()> {
     let is_figure = job.sequence.figure.is_some();
     let no_whole = |o: &&Output| o.format.whole == OneDrawing::Never || o.target.is_numbered();
     if let Some(output) = job.outputs.iter().find(no_whole).filter(|_| is_figure) {
+        let path = output.target.path().display();
         return Err(Error::usage(
-            format!(
-                "`{}` cannot contain a figure",
-                output.target.path().display()
-            ),
+            format!("`{path}` cannot contain a figure"),
             "figures are `.pdf`, `.svg`, `.png` or `.webp`, and `.tex` to include them; `bagreel render` writes the rest",
         ));
     }
@@ -121,9 +119,8 @@ pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) ->
     check_filters(&mission.elements, &job.drawing.view)?;
     let still = still(job, &mut mission);
     let outputs = still.map_or(&job.outputs[..], std::slice::from_ref);
-    let has_grouped = outputs
-        .iter()
-        .any(|o| o.format.is_drawn && !has_all_topics(o));
+    let is_grouped = |o: &Output| o.format.is_drawn && !has_all_topics(o);
+    let has_grouped = outputs.iter().any(is_grouped);
     let mut notices = Notices::new();
     let mut written = vec![Written::default(); outputs.len()];
     // Both drawings of the mission are the same as if only one kind of output had been requested.
@@ -135,11 +132,9 @@ pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) ->
             continue;
         }
         let mut showing = Showing::new(job, &mission, outputs);
-        let files = showing.show(watch)?;
-        places
-            .into_iter()
-            .zip(files)
-            .for_each(|(at, file)| written[at] = file);
+        for (at, file) in places.into_iter().zip(showing.show(watch)?) {
+            written[at] = file;
+        }
         let known: Vec<Notice> = notices.iter().collect();
         let more = showing.notices.iter().filter(|n| !known.contains(n));
         notices.extend(more);
@@ -503,9 +498,8 @@ impl<'a> Showing<'a> {
         let is_drawn = |o: &&Output| o.format.is_drawn && o.format.whole != OneDrawing::Asked;
         let mut drawn = self.outputs.iter().filter(is_drawn).peekable();
         drawn.peek()?;
-        let frames = sequence
-            .frame_times(drawn.all(|o| o.format.is_film()))
-            .len();
+        let are_films = drawn.all(|o| o.format.is_film());
+        let frames = sequence.frame_times(are_films).len();
         if frames <= MANY_FRAMES {
             return None;
         }

@@ -159,13 +159,11 @@ fn listed(job: &Tables) -> Result<Vec<Listed>> {
     let is_read = |bag: &&Listed| read.contains(&resolved(&bag.file));
     match all.iter().find(is_read) {
         None => Ok(all),
-        Some(bag) => Err(Error::usage(
-            format!(
-                "a table would overwrite `{}`, which is read",
-                bag.file.display()
-            ),
-            "give another folder",
-        )),
+        Some(bag) => {
+            let file = bag.file.display();
+            let what = format!("a table would overwrite `{file}`, which is read");
+            Err(Error::usage(what, "give another folder"))
+        }
     }
 }
 

@@ -56,12 +56,11 @@ impl Opened {
         let views = folded.into_iter().chain([&whole.view]);
         let drawn: usize = views.map(|v| v.items.len() + v.arrows.len()).sum();
         if is_drawn && drawn > MOST_DRAWN {
-            return Err(Error::usage(
-                format!(
-                    "a page of {drawn} boxes and arrows is too large; the limit is {MOST_DRAWN}"
-                ),
-                "omit some with `--ns-filter`, `--hide dead,leaf` or `--mode nodes`",
-            ));
+            let what = format!(
+                "a page of {drawn} boxes and arrows is too large; the limit is {MOST_DRAWN}"
+            );
+            let hint = "omit some with `--ns-filter`, `--hide dead,leaf` or `--mode nodes`";
+            return Err(Error::usage(what, hint));
         }
         let part = is_drawn.then(|| drawn_part(&whole.view, mission, &whole.options));
         let is_listed = |also: &AlsoHere| also.items.len() <= MOST_LISTED;
@@ -75,10 +74,8 @@ impl Opened {
 
     /// The picture of that view; `None` if no output is a page.
     pub(super) fn drawings<'a>(&'a self, drawing: &'a Drawing) -> Option<OpenedDrawings<'a>> {
-        let view = self
-            .part
-            .as_ref()
-            .map_or(&self.whole.view, |part| &part.view);
+        let part = self.part.as_ref();
+        let view = part.map_or(&self.whole.view, |part| &part.view);
         self.is_drawn.then(|| {
             let measured = drawing.measured(view, self.whole.page.clone());
             let layout = drawing.laid_out(measured.plan(), &measured.layout_options(), None);

@@ -50,11 +50,8 @@ fn compare(first: &Collected, second: &Collected, reading: &Reading) -> Result<V
     let (messages, theirs) = (messages(&ours), messages(&theirs));
     let same = messages == theirs && differing == 0;
     let mut notices = unverified(first, second);
-    let reader = if notices.is_empty() {
-        "reader"
-    } else {
-        "reading"
-    };
+    let is_other = notices.is_empty();
+    let reader = if is_other { "reader" } else { "reading" };
     notices.push(if same {
         let text = format!("a second {reader} counts the same {messages} messages");
         Notice::new(NoticeKind::Note, text)

@@ -64,9 +64,8 @@ pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted>
     if tables.all.iter().all(|table| table.rows == 0) {
         return Err(nothing(job, &lost));
     }
-    let (written, rows) = tables
-        .finish()
-        .map_err(Error::io("write into", job.target.path()))??;
+    let failed = Error::io("write into", job.target.path());
+    let (written, rows) = tables.finish().map_err(failed)??;
     Ok(Extracted {
         tables: written,
         rows,
@@ -350,10 +349,8 @@ impl Sink for OfBag<'_> {
         let tables = is_wanted.then(|| {
             let decoders = Decoders::new(connection, self.types)?;
             misfit = decoders.why;
-            let all = decoders.all.into_iter();
-            Ok(all
-                .map(|one| self.tables.of(topic, type_name, one))
-                .collect())
+            let table = |one| self.tables.of(topic, type_name, one);
+            Ok(decoders.all.into_iter().map(table).collect())
         });
         let want = match tables {
             Some(Ok(_)) => Want::Payload,

@@ -32,6 +32,10 @@ worded! {
 }
 
 impl Certainty {
+    fn of(is_sure: bool) -> Self {
+        if is_sure { Self::Sure } else { Self::SoFar }
+    }
+
     /// A line of text, or an object, with its certainty.
     fn mark(self, mut line: LogLine, format: LogFormat) -> LogLine {
         match (format, self) {
@@ -66,11 +70,8 @@ enum Key {
 
 /// A row with its place among all that were printed as `id`: that in the log of a growing recording changes.
 fn numbered(mut line: LogLine, id: usize) -> LogLine {
-    if let Some((_, rest)) = line
-        .words
-        .strip_prefix("{\"id\":")
-        .and_then(|row| row.split_once(','))
-    {
+    let row = line.words.strip_prefix("{\"id\":");
+    if let Some((_, rest)) = row.and_then(|row| row.split_once(',')) {
         line.words = format!("{{\"id\":{id},{rest}");
     }
     line
@@ -192,12 +193,7 @@ fn identity(mission: &Mission, row: &LogRow<'_>, now: Stamp) -> Option<(Key, Sta
             };
             // By then the last of its stops is certain.
             let is_over = now.since(one.time) >= SWITCH_NS + SURE_NS;
-            let certainty = if is_over {
-                Certainty::Sure
-            } else {
-                Certainty::SoFar
-            };
-            (key, one.time, certainty)
+            (key, one.time, Certainty::of(is_over))
         }
         LogRow::Phase(..) | LogRow::Part(..) => return None,
     })
@@ -208,11 +204,7 @@ fn certainty(event: &Event, now: Stamp) -> Certainty {
     let is_open = matches!(event.kind, Kind::Stopped | Kind::Vanished | Kind::Rate);
     let is_away = event.kind == Kind::Silent && event.until.is_none();
     let is_fresh = now.since(event.time.max(event.latest)) < SURE_NS;
-    if is_away || is_open && is_fresh {
-        Certainty::SoFar
-    } else {
-        Certainty::Sure
-    }
+    Certainty::of(!(is_away || is_open && is_fresh))
 }
 
 /// The findings of an expectation so far, by fingerprint: since when, and the line once it was printed.
