@@ -158,7 +158,7 @@ impl<I: Id, T> ById<I, Vec<T>> {
 }
 
 /// As [`ById`], for values that few of very many ids have: the others take no space.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Few<I, T>(BTreeMap<I, T>);
 
 impl<I: Copy + Ord, T> Few<I, T> {
@@ -188,12 +188,6 @@ impl<I: Copy + Ord, T> Few<I, Vec<T>> {
     /// The list of an id; empty if it has none.
     pub(crate) fn of(&self, id: I) -> &[T] {
         self.get(id).map_or(&[], |list| list)
-    }
-}
-
-impl<I, T> Default for Few<I, T> {
-    fn default() -> Self {
-        Self(BTreeMap::new())
     }
 }
 

@@ -2,14 +2,8 @@
 //! number of changes, and the value of a window is found by one search.
 
 /// Pairs of the window from which a value applies and the value, in order of the windows.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Runs<T>(pub(crate) Vec<(u32, T)>);
-
-impl<T> Default for Runs<T> {
-    fn default() -> Self {
-        Self(Vec::new())
-    }
-}
 
 impl<T: Copy + PartialEq> Runs<T> {
     /// Adds the value from this window on, unless it applies already; `initial` applies before the first run.

@@ -33,8 +33,15 @@ pub(super) struct FigureArgs {
     /// Width on paper: `88mm`, `180mm`. [default: 88mm]
     #[arg(long, value_name = "MM", value_parser = width)]
     width: Option<f64>,
-    #[command(flatten)]
-    form: FigureForm,
+    /// What a row of `lives` represents. [default: the finest that fits]
+    #[arg(long, value_name = "nodes|groups|topics", value_parser = one_of(RowKind::ALL))]
+    rows: Option<RowKind>,
+    /// Phases whose beginnings `steps` shows, such as `3,5`. [default: the six with most changes]
+    #[arg(long, value_name = "N,M,…", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(2..))]
+    steps: Vec<u16>,
+    /// Size of names, `7pt` to `12pt`; other text is a point smaller. [default: 7pt]
+    #[arg(long, value_name = "PT", value_parser = points)]
+    text: Option<f64>,
     #[command(flatten)]
     phases: PhaseArgs,
     /// Draw the figure without its legend.
@@ -55,20 +62,6 @@ pub(super) struct FigureArgs {
     topic_filter: Option<String>,
     #[command(flatten)]
     graph: GraphArgs,
-}
-
-/// The options of every kind of figure.
-#[derive(Debug, Default, Args)]
-pub(super) struct FigureForm {
-    /// What a row of `lives` represents. [default: the finest that fits]
-    #[arg(long, value_name = "nodes|groups|topics", value_parser = one_of(RowKind::ALL))]
-    rows: Option<RowKind>,
-    /// Phases whose beginnings `steps` shows, such as `3,5`. [default: the six with most changes]
-    #[arg(long, value_name = "N,M,…", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(2..))]
-    steps: Vec<u16>,
-    /// Size of names, `7pt` to `12pt`; other text is a point smaller. [default: 7pt]
-    #[arg(long, value_name = "PT", value_parser = points)]
-    text: Option<f64>,
 }
 
 /// Reads once and draws a figure.
@@ -105,15 +98,15 @@ fn job(args: &FigureArgs) -> Result<Render> {
 
 /// The requested figure, with its width on paper in millimetres.
 fn options(args: &FigureArgs) -> Result<FigureOptions> {
-    let (form, kind) = (&args.form, args.kind);
-    let steps = form.steps.iter().map(|s| usize::from(*s)).collect();
-    if kind != FigureKind::Steps && !form.steps.is_empty() {
+    let kind = args.kind;
+    let steps = args.steps.iter().map(|s| usize::from(*s)).collect();
+    if kind != FigureKind::Steps && !args.steps.is_empty() {
         return Err(Error::usage(
             format!("`--steps` has no effect on `{}`", kind.word()),
             "it chooses the panels of `--kind steps`",
         ));
     }
-    if kind != FigureKind::Lives && form.rows.is_some() {
+    if kind != FigureKind::Lives && args.rows.is_some() {
         return Err(Error::usage(
             format!("`--rows` has no effect on `{}`", kind.word()),
             "it chooses the rows of `--kind lives`",
@@ -123,8 +116,8 @@ fn options(args: &FigureArgs) -> Result<FigureOptions> {
     Ok(FigureOptions {
         kind,
         width_mm: args.width.unwrap_or(default.width_mm),
-        text_pt: form.text.unwrap_or(default.text_pt),
-        rows: form.rows,
+        text_pt: args.text.unwrap_or(default.text_pt),
+        rows: args.rows,
         steps,
         is_bare: args.bare,
         ..default

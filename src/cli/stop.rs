@@ -28,11 +28,9 @@ impl Stop {
     /// Handles SIGINT, SIGTERM, and SIGHUP unless that is ignored already; `report` prints why the process ends, if
     /// that becomes necessary.
     pub(super) fn listen(report: fn()) -> Self {
-        let signal = Arc::new(AtomicU8::new(0));
-        let is_noted = Arc::default();
         let stop = Self {
-            signal,
-            is_noted,
+            signal: Arc::default(),
+            is_noted: Arc::default(),
             report,
         };
         listen(&stop);

@@ -13,7 +13,7 @@ use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::{Bound, Sending};
-use crate::graph::{ById, Edge, EdgeId, Element, NodeId, PerElement, Row, State, TopicId, Wiring};
+use crate::graph::{ById, Edge, Element, NodeId, PerElement, Row, State, TopicId, Wiring};
 use crate::mission::event_log::{Event, Kind};
 use crate::mission::rates::Rates;
 use crate::mission::{Mission, Window};
@@ -51,7 +51,7 @@ pub(crate) struct Role<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Peer {
     pub(crate) node: NodeId,
-    pub(crate) edge: EdgeId,
+    pub(crate) edge: Element,
     pub(crate) confidence: Confidence,
     pub(crate) evidence: Evidence,
 }
@@ -327,28 +327,29 @@ impl<'a> Facts<'a> {
 
     /// The publishers of a topic, except unnamed nodes.
     pub(crate) fn publishers(&self, topic: TopicId) -> Vec<Peer> {
-        let nodes = self.wiring.publishers[topic].iter();
-        let edge = |node| self.mission.elements.publication(node, topic);
-        let peers = nodes.filter_map(|node| self.peer(*node, edge(*node)?, Element::Publish));
-        peers.collect()
+        let edge = |node| self.mission.elements.published((node, topic));
+        self.peers(&self.wiring.publishers[topic], edge)
     }
 
     /// The subscribers of a topic, except unnamed nodes.
     pub(crate) fn subscribers(&self, topic: TopicId) -> Vec<Peer> {
-        let nodes = self.wiring.subscribers[topic].iter();
-        let edge = |node| self.mission.elements.subscription(topic, node);
-        let peers = nodes.filter_map(|node| self.peer(*node, edge(*node)?, Element::Subscribe));
-        peers.collect()
+        let edge = |node| self.mission.elements.subscribed((node, topic));
+        self.peers(&self.wiring.subscribers[topic], edge)
     }
 
-    fn peer(&self, node: NodeId, edge: EdgeId, element: fn(EdgeId) -> Element) -> Option<Peer> {
-        let evidence = self.mission.elements.evidence(element(edge));
-        (!evidence.is_guess()).then(|| Peer {
-            node,
-            edge,
-            confidence: self.confidence(element(edge)),
-            evidence,
-        })
+    /// The ends of edges at these nodes.
+    fn peers(&self, nodes: &[NodeId], edge: impl Fn(NodeId) -> Option<Element>) -> Vec<Peer> {
+        let peer = |node: &NodeId| {
+            let edge = edge(*node)?;
+            let evidence = self.mission.elements.evidence(edge);
+            (!evidence.is_guess()).then(|| Peer {
+                node: *node,
+                edge,
+                confidence: self.confidence(edge),
+                evidence,
+            })
+        };
+        nodes.iter().filter_map(peer).collect()
     }
 
     /// The roles of these, without tools and without what is only inferred.
@@ -414,14 +415,13 @@ impl<'a> Facts<'a> {
     }
 
     /// The time in which a node published a topic, if known, and the number of its messages.
-    pub(crate) fn sent(&self, node: NodeId, edge: EdgeId) -> Option<(Span, u64)> {
-        let mission = self.mission;
-        let runs = match &mission.elements.seen(Element::Publish(edge)).lives[..] {
+    pub(crate) fn sent(&self, node: NodeId, edge: Element) -> Option<(Span, u64)> {
+        let runs = match &self.mission.elements.seen(edge).lives[..] {
             [] => self.lives(&[node]),
             runs => runs.to_vec(),
         };
         let span = Span::new(runs.first()?.start, runs.last()?.end);
-        Some((span, messages(mission, Element::Publish(edge))))
+        Some((span, messages(self.mission, edge)))
     }
 
     /// Entries of the event log about any of these nodes, but not about their edges.

@@ -335,22 +335,14 @@ impl Judge<'_> {
             let found = self.strange_topics(severity);
             self.note("unexpected topics", at, found);
         }
-        let (starved, duplicates) = (policy.starved, policy.duplicate_names);
-        for (title, kind, finding, unlisted) in [
-            ("starved", Kind::Starved, FindingKind::Starved, starved),
-            (
-                "duplicate names",
-                Kind::Duplicate,
-                FindingKind::DuplicateName,
-                duplicates,
-            ),
-            (
-                "messages lost",
-                Kind::Lost,
-                FindingKind::MessagesLost,
-                policy.messages_lost,
-            ),
-        ] {
+        let (twice, lost) = (policy.duplicate_names, policy.messages_lost);
+        let kinds = [Kind::Starved, Kind::Duplicate, Kind::Lost];
+        let remarks = [
+            ("starved", FindingKind::Starved, policy.starved),
+            ("duplicate names", FindingKind::DuplicateName, twice),
+            ("messages lost", FindingKind::MessagesLost, lost),
+        ];
+        for (kind, (title, finding, unlisted)) in kinds.into_iter().zip(remarks) {
             let severity = unlisted.severity();
             let found = severity.map(|severity| self.remarks(kind, finding, severity));
             if let Some(found) = found.filter(|found| !found.is_empty()) {

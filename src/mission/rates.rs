@@ -104,12 +104,8 @@ impl<'a> Rates<'a> {
     /// The publications among some elements; on the topic of this name, if one is given.
     pub(crate) fn publications(&self, among: &[Element], topic: Option<&str>) -> Vec<EdgeId> {
         let elements = &self.mission.elements;
-        let is_on = |id: &EdgeId| {
-            let edge = elements.publishes.get(*id);
-            topic.is_none_or(|name| {
-                edge.is_some_and(|e| elements.topics[e.topic].name.as_str() == name)
-            })
-        };
+        let is_on =
+            |id: &EdgeId| topic.is_none_or(|_| elements.names(Element::Publish(*id)).1 == topic);
         let edges = among.iter().filter_map(|what| match what {
             Element::Publish(id) => Some(*id),
             _ => None,

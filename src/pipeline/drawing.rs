@@ -186,12 +186,4 @@ impl Medium {
             None => style,
         }
     }
-
-    /// The advice if the graph cannot be made legible.
-    pub(crate) fn advice(&self) -> &'static str {
-        match self.paper {
-            None => "draw less with `--ns-filter`, `--hide dead,leaf` or `--mode nodes`",
-            Some(_) => "draw less with `--ns-filter` or `--mode nodes`, or print it wider",
-        }
-    }
 }

@@ -1,6 +1,6 @@
 //! Makes a drawing legible: enlarges the page, draws topics as lines, collapses constant elements, then changing ones.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::compose::Composed;
@@ -442,12 +442,10 @@ fn outermost<'n>(name: &'n str, common: &str) -> Option<&'n str> {
 
 /// The outermost namespace of nearly all of these names; empty if there is none.
 fn common_space<'n>(names: &[&'n str]) -> &'n str {
-    let mut spaces: BTreeMap<&str, usize> = BTreeMap::new();
-    for space in names.iter().filter_map(|name| outermost(name, "")) {
-        *spaces.entry(space).or_default() += 1;
-    }
+    let spaces = names.iter().filter_map(|name| outermost(name, ""));
+    let spaces = grouped(spaces.map(|space| (space, ())));
     let most = names.len() * COMMON.0 / COMMON.1;
-    let common = spaces.into_iter().find(|(_, many)| *many > most);
+    let common = spaces.into_iter().find(|(_, all)| all.len() > most);
     common.map_or("", |(space, _)| space)
 }
 
@@ -585,16 +583,16 @@ fn reported(
         );
         notices.add(Notice::new(NoticeKind::Hidden, text));
     }
-    if let Some(medium) = drawing.medium.as_ref().filter(|_| !is_readable) {
-        let size = match got.width_mm {
-            Some(mm) => {
-                let pt = text * mm / got.size.w * 72.0 / 25.4;
-                format!("{} pt", words::number(words::significant(pt, 2)))
-            }
-            None => format!("{} pixels", words::number(words::significant(text, 2))),
+    if drawing.medium.is_some() && !is_readable {
+        let (size, unit, advice) = if let Some(mm) = got.width_mm {
+            let advice = "draw less with `--ns-filter` or `--mode nodes`, or print it wider";
+            (text * mm / got.size.w * 72.0 / 25.4, "pt", advice)
+        } else {
+            let advice = "draw less with `--ns-filter`, `--hide dead,leaf` or `--mode nodes`";
+            (text, "pixels", advice)
         };
-        let advice = medium.advice();
-        let text = format!("the smallest text will be {size}, too small to read; {advice}");
+        let size = words::number(words::significant(size, 2));
+        let text = format!("the smallest text will be {size} {unit}, too small to read; {advice}");
         notices.add(Notice::new(NoticeKind::Note, text));
     } else if !is_readable {
         let text = format!(

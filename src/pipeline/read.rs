@@ -271,18 +271,15 @@ fn mission(
     reading: &Reading,
 ) -> Result<Mission> {
     let recorded = &collected.recorded;
-    let graphs = |spans: &[Span]| graphs(recorded, findings, &history, spans);
     let log = log_of(&history, collected, reading)?;
     let mut windows = divided(reading, collected.range, &log)?;
     let period = windows.period;
-    let mut windowed = graphs(&windows.spans)?;
-    let mut list = list(&windows, &windowed, &history, &log);
     let is_still = reading.is_still_if_unchanged && is_still(&windows, &log);
     if is_still {
         windows.spans = vec![windows.span];
-        windowed = graphs(&windows.spans)?;
-        list = self::list(&windows, &windowed, &history, &log);
     }
+    let windowed = graphs(recorded, findings, &history, &windows.spans)?;
+    let list = list(&windows, &windowed, &history, &log);
     let mut notices: Notices = recorded.notices.clone();
     notices.extend(findings.notices.iter());
     notices.extend(doubled(&history));

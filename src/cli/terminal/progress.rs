@@ -14,8 +14,7 @@ const TICK: Duration = Duration::from_millis(120);
 #[derive(Debug)]
 pub(super) struct Progress {
     is_shown: bool,
-    bar: Option<ProgressBar>,
-    stage: Option<Stage>,
+    bar: Option<(Stage, ProgressBar)>,
     begun: Instant,
 }
 
@@ -25,7 +24,6 @@ impl Progress {
         Self {
             is_shown: is_shown && io::stderr().is_terminal() && !is_dumb(),
             bar: None,
-            stage: None,
             begun: Instant::now(),
         }
     }
@@ -39,16 +37,15 @@ impl Progress {
     /// Begins a stage and ends the previous one.
     pub(super) fn begin(&mut self, stage: Stage) {
         self.end();
-        self.stage = Some(stage);
-        self.bar = self.is_shown.then(|| bar(stage));
+        self.bar = self.is_shown.then(|| (stage, bar(stage)));
     }
 
     /// Sets the progress of the current stage: `done` of `total`, which is 0 if unknown.
     pub(super) fn set(&self, done: u64, total: u64) {
-        if let Some(bar) = &self.bar {
+        if let Some((stage, bar)) = &self.bar {
             if total > 0 {
                 if bar.length().is_none() {
-                    bar.set_style(style(counted(self.stage)));
+                    bar.set_style(style(counted(*stage)));
                 }
                 bar.set_length(total.max(done));
             }
@@ -58,16 +55,15 @@ impl Progress {
 
     /// Ends the current stage and clears its bar.
     pub(super) fn end(&mut self) {
-        if let Some(bar) = self.bar.take() {
+        if let Some((_, bar)) = self.bar.take() {
             bar.finish_and_clear();
         }
-        self.stage = None;
     }
 
     /// Prints something with the bar hidden.
     pub(super) fn aside(&self, print: impl FnOnce()) {
         match &self.bar {
-            Some(bar) => bar.suspend(print),
+            Some((_, bar)) => bar.suspend(print),
             None => print(),
         }
     }
@@ -97,10 +93,10 @@ fn bar(stage: Stage) -> ProgressBar {
 }
 
 /// The template of a bar with a known total.
-fn counted(stage: Option<Stage>) -> &'static str {
+fn counted(stage: Stage) -> &'static str {
     match stage {
-        Some(Stage::Read | Stage::Verify) => "{msg:>9} [{bar:40}] {bytes}/{total_bytes}",
-        Some(Stage::Draw) => "{msg:>9} [{bar:40}] frame {pos} of {len}, {eta} left",
+        Stage::Read | Stage::Verify => "{msg:>9} [{bar:40}] {bytes}/{total_bytes}",
+        Stage::Draw => "{msg:>9} [{bar:40}] frame {pos} of {len}, {eta} left",
         _ => "{msg:>9} [{bar:40}] {pos}/{len}",
     }
 }

@@ -86,14 +86,12 @@ fn side_of(mission: &Mission) -> MissionSide {
     }
     for id in facts.topics(&Pattern::new("**")) {
         let (own, name) = (TopicIn { facts, id }, facts.topic(id).to_owned());
-        let ends = |peer: Peer| (facts.role(peer.node).to_owned(), name.clone());
+        let role = |peer: Peer| facts.role(peer.node).to_owned();
         for peer in facts.publishers(id) {
-            let (node, topic) = ends(peer);
-            side.insert(Key::Publish(node, topic), peer.into());
+            side.insert(Key::Publish(role(peer), name.clone()), peer.into());
         }
         for peer in facts.subscribers(id) {
-            let (node, topic) = ends(peer);
-            side.insert(Key::Subscribe(topic, node), peer.into());
+            side.insert(Key::Subscribe(name.clone(), role(peer)), peer.into());
         }
         let topic = Known {
             evidence: elements.topics[id].seen.evidence,

@@ -1,8 +1,9 @@
 //! An event as one sentence: the change, the element, and the parts that appeared or vanished with it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use super::{Detail, Event, EventId, Interruption, InterruptionKind, Kind, Parts, Switch};
+use crate::base::ids::grouped;
 use crate::base::name::{is_quiet, namespace};
 use crate::base::words::{self, visible};
 use crate::graph::history::begins_steadily as begins_steadily_in;
@@ -269,10 +270,8 @@ fn short_topics(elements: &Elements, topics: &BTreeSet<TopicId>, space: &str) ->
         let (action, part) = name.rsplit_once('/')?;
         ACTION.contains(&part).then(|| action.to_owned())
     };
-    let mut parts: BTreeMap<String, usize> = BTreeMap::new();
-    for action in topics.iter().filter_map(|id| action(full(id))) {
-        *parts.entry(action).or_default() += 1;
-    }
+    let actions = topics.iter().filter_map(|id| action(full(id)));
+    let parts = grouped(actions.map(|action| (action, ())));
     let (mut names, mut seen) = (Vec::new(), BTreeSet::new());
     for name in topics.iter().map(full).filter(|name| !is_quiet(name)) {
         let within = |name: &str| {
@@ -280,7 +279,7 @@ fn short_topics(elements: &Elements, topics: &BTreeSet<TopicId>, space: &str) ->
             let inner = inner.and_then(|rest| rest.strip_prefix('/'));
             visible(inner.unwrap_or(name)).into_owned()
         };
-        let phrase = match action(name).filter(|action| parts[action] > 1) {
+        let phrase = match action(name).filter(|action| parts[action].len() > 1) {
             Some(action) => format!("{} (action)", within(action.trim_end_matches("/_action"))),
             None => within(name),
         };

@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::base::name::is_quiet;
 use crate::base::time::Span;
 use crate::base::words;
-use crate::graph::{Element, NodeId, TopicId};
+use crate::graph::{Edge, Element, TopicId};
 use crate::mission::Mission;
 use crate::mission::event_log::{Detail, Phase};
 use crate::mission::phases::knows_publishers;
@@ -63,26 +63,16 @@ fn lives(mission: &Mission) -> Option<FigureInfo> {
 
 fn graph(mission: &Mission) -> Option<FigureInfo> {
     let elements = &mission.elements;
-    let is_shown = |node: NodeId| {
-        let node = elements.nodes.get(node);
-        node.is_some_and(|n| !n.is_tool())
+    let is_shown = |topic: &TopicId| !is_quiet(elements.topics[*topic].name.as_str());
+    let topics = |edges: &[Edge]| -> BTreeSet<TopicId> {
+        let shown = edges.iter().filter(|e| !elements.nodes[e.node].is_tool());
+        shown.map(|e| e.topic).filter(is_shown).collect()
     };
-    let sent: BTreeSet<TopicId> = ends(&elements.publishes, &is_shown);
-    let subscribed: BTreeSet<TopicId> = ends(&elements.subscribes, &is_shown);
-    let both = sent.intersection(&subscribed).filter(|topic| {
-        let topic = elements.topics.get(**topic);
-        topic.is_some_and(|t| !is_quiet(t.name.as_str()))
-    });
-    let both = both.count();
+    let (sent, subscribed) = (topics(&elements.publishes), topics(&elements.subscribes));
+    let both = sent.intersection(&subscribed).count();
     let many = words::count(both, "topic");
     let shows = format!("who publishes to whom, and when: over {many}");
     (both > 0).then(|| FigureInfo::of("graph", shows))
-}
-
-/// The topics of edges whose nodes are shown.
-fn ends(edges: &[crate::graph::Edge], is_shown: &dyn Fn(NodeId) -> bool) -> BTreeSet<TopicId> {
-    let shown = edges.iter().filter(|e| is_shown(e.node));
-    shown.map(|e| e.topic).collect()
 }
 
 fn holders(mission: &Mission) -> Option<FigureInfo> {

@@ -172,10 +172,8 @@ fn counts(times: &MessageTimes<'_>, windows: Windows) -> Result<Vec<Count>> {
             let is_sized = times.stamps.sized(series[timed.series]);
             let size = is_sized.then_some(u64::from(timed.size));
             // Messages are sorted by time, so most are in the window of the one before.
-            if let Some(count) = all
-                .last_mut()
-                .filter(|_| end.is_some_and(|end| timed.time < end))
-            {
+            let is_same = end.is_some_and(|end| timed.time < end);
+            if let Some(count) = all.last_mut().filter(|_| is_same) {
                 count.add(timed.time, size);
                 return;
             }
