@@ -171,6 +171,32 @@ fn a_recorder_of_all_topics_dates_the_birth_of_each() {
 }
 
 #[test]
+fn a_node_starts_when_the_recorder_connects_to_its_log() {
+    let text = |found: &[i64], number: u32, second: i64| {
+        let mut bag = minute(&[("/base", "/odom", 0, 60)]);
+        let mut record = |node: &str, second, number: u32, text: &str, file| {
+            let log = bag.publisher(node, "/rosout", "rosgraph_msgs/Log");
+            LOG.clone_into(&mut bag.publishers[log].definition);
+            let mut record = log1(node, text, file, &[]);
+            record[..4].copy_from_slice(&number.to_le_bytes());
+            at(&mut bag, log, second, record);
+        };
+        for second in found {
+            let text = "Subscribing to /odom";
+            record("/record_1", *second, 7, text, "/src/recorder.cpp");
+        }
+        record("/teleop", second, number, "ready", "teleop.py");
+        sorted(bag)
+    };
+    let started = text(&[0], 2, 30);
+    assert!(started.contains("00:30.0  /teleop started"), "{started}");
+    // Without the log of the recorder's start, this may be a part of a longer recording, and so may what comes at once.
+    assert_eq!(text(&[], 2, 30), "");
+    assert_eq!(text(&[20], 2, 30), "");
+    assert_eq!(text(&[0], 2, 3), "");
+}
+
+#[test]
 fn a_topic_of_unnamed_senders_begins_only_with_many_messages() {
     let text = |sent: (i64, i64), period: i64| {
         let mut bag = Recording::default();
