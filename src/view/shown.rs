@@ -204,6 +204,24 @@ impl Shown {
         [0, 1].map(|way| self.topics.iter().any(|row| row.ways[way]))
     }
 
+    /// Whether messages run along it, and it lasts.
+    pub(crate) fn is_sending(&self) -> bool {
+        self.state == State::Active && !self.is_paused && !self.is_starved && !self.is_ghost()
+    }
+
+    /// The messages per second along the arrow and against it, in thousandths.
+    pub(crate) fn flow(&self) -> [u64; 2] {
+        if !self.is_sending() {
+            return [0, 0];
+        }
+        let thousandths = |hz: f64| cast::to_u64(libm::round(hz.max(0.0) * 1e3));
+        let rows = |way: usize| self.topics.iter().filter(move |row| row.ways[way]);
+        match self.topics.len() {
+            0 => [thousandths(self.written_rate().0.unwrap_or(0.0)), 0],
+            _ => [0, 1].map(|way| thousandths(rows(way).filter_map(|row| row.hz).sum())),
+        }
+    }
+
     /// Whether its rate changed in the window.
     pub(crate) fn has_new_rate(&self) -> bool {
         matches!(self.mark, Some(Mark::Faster | Mark::Slower)) && self.steps.len() > 1
