@@ -164,8 +164,6 @@ impl AnimatedScenes {
 
 /// The speed of dots, in pixels a second: that of a walk across a picture of a README in 20 s.
 const SPEED: f64 = 36.0;
-/// The least distance between dots, in pixels: above 4.5 Hz they are as close as can be told apart.
-const CLOSEST: f64 = 8.0;
 
 /// Writes a dot per message on the line of a group, at the pace of its messages.
 fn dots(xml: &mut Xml, group: &Group) {
@@ -181,7 +179,7 @@ fn dots(xml: &mut Xml, group: &Group) {
         if *flow == 0 {
             continue;
         }
-        let apart = (SPEED * 1e3 / *flow as f64).max(CLOSEST);
+        let apart = SPEED * 100.0 / f64::from(*flow);
         let (gap, seconds) = (tenth(apart), hundredth(apart / SPEED));
         let to = tenth(back * apart);
         xml.open("path")
@@ -249,7 +247,7 @@ mod tests {
             Stroke::solid(Color::of([0, 0, 0]), 1.0),
         );
         scene.groups[0].shape(line);
-        scene.groups[0].flow = [2_000, 100_000];
+        scene.groups[0].flow = [200, 450];
         let film = AnimatedScenes::new([(scene, ms)].into_iter());
         let svg = film.write("film", 0);
         assert_eq!(svg.matches("class=\"dots\"").count(), 2);
