@@ -67,6 +67,16 @@ fn the_start_of_an_input_is_not_that_of_its_relay() {
                 bag.messages.push((again, time + 1_000_000, payload));
             }
         }
+        // A relay of ROS 1 advertises its topic then, and logs that; the recorder's log finds the topic.
+        let mut log = |node: &str, text: &str, file, second| {
+            let log = bag.publisher(node, "/rosout", "rosgraph_msgs/Log");
+            LOG.clone_into(&mut bag.publishers[log].definition);
+            at(&mut bag, log, second, log1(node, text, file, &[]));
+        };
+        let [record, recorder] = ["/record_1", "/src/recorder.cpp"];
+        log(record, "Subscribing to /view", recorder, 0);
+        log(record, "Subscribing to /again", recorder, relay);
+        log("/relay", "advertised as /again\n", "/src/relay.cpp", relay);
         sorted(bag)
     };
     let both = text(20, 20);

@@ -26,10 +26,14 @@ pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
         let is_own = context.stream.publisher == Some(node);
         let publishes = Observation::Publish(node, log);
         let is_first = is_own && !context.facts.has(context.source, publishes);
-        if record.number.is_some_and(|number| number <= FIRST_RECORD) {
+        // A relay of `topic_tools` logs this when its input begins, however long it has waited.
+        let number = record
+            .number
+            .filter(|_| !text.starts_with("advertised as "));
+        if number.is_some_and(|number| number <= FIRST_RECORD) {
             let begins = || format!("{name} logs its first record: {text}");
             context.states(Observation::Begins(node), begins);
-        } else if record.number.is_some() && is_first {
+        } else if number.is_some() && is_first {
             context.states(Observation::Continues(node), String::new);
         }
         context.states(publishes, logs);
