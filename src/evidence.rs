@@ -179,7 +179,7 @@ pub const SOURCES: &[Source] = sources! {
           conclude: &[sim_time::conclude],
           own: true }
     "links" "log records of roscpp about its connections, and of recorders about the topics they find"
-        { reads: &[(dynamic::LOGS, Log(log_text::read_links))], conclude: &[log_text::conclude_births] }
+        { reads: &[(dynamic::LOGS, Log(log_text::read_links))], conclude: &[log_text::conclude_births, log_text::conclude_connected] }
     "diagnostics" "statuses are named after their nodes; the publisher of `/diagnostics_agg` subscribes to `/diagnostics`"
         { reads: &[(&[diagnostics::SHAPE], Payload(diagnostics::read))], conclude: &[diagnostics::conclude] }
     "rosout" "log records of ROS 1 (`rosgraph_msgs/Log`) and ROS 2 (`rcl_interfaces/msg/Log`)"

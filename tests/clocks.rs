@@ -507,14 +507,16 @@ fn two_recorders_in_simulated_time_are_of_one_run_if_a_node_started_once() {
             .for_each(|message| message.1 -= healthy.begin - 100 * SECOND);
         all
     };
-    let alone = mission(&[simulated(0)], |_, _| {});
-    let both = mission(&[simulated(0), simulated(healthy.length / 3)], |_, _| {});
-    assert!(
-        says(&both, "messages of `1.bag`, recorded twice"),
-        "{:?}",
-        both.notices
-    );
-    assert_eq!(headlines(&both), headlines(&alone));
+    for first in [simulated(0), healthy.all.clone()] {
+        let alone = mission(std::slice::from_ref(&first), |_, _| {});
+        let both = mission(&[first, simulated(healthy.length / 3)], |_, _| {});
+        assert!(
+            says(&both, "messages of `1.bag`, recorded twice"),
+            "{:?}",
+            both.notices
+        );
+        assert_eq!(headlines(&both), headlines(&alone));
+    }
 }
 
 #[test]

@@ -67,6 +67,16 @@ fn the_start_of_an_input_is_not_that_of_its_relay() {
                 bag.messages.push((again, time + 1_000_000, payload));
             }
         }
+        // A relay of ROS 1 advertises its topic then, and logs that; the recorder's log finds the topic.
+        let mut log = |node: &str, text: &str, file, second| {
+            let log = bag.publisher(node, "/rosout", "rosgraph_msgs/Log");
+            LOG.clone_into(&mut bag.publishers[log].definition);
+            at(&mut bag, log, second, log1(node, text, file, &[]));
+        };
+        let [record, recorder] = ["/record_1", "/src/recorder.cpp"];
+        log(record, "Subscribing to /view", recorder, 0);
+        log(record, "Subscribing to /again", recorder, relay);
+        log("/relay", "advertised as /again\n", "/src/relay.cpp", relay);
         sorted(bag)
     };
     let both = text(20, 20);
@@ -168,6 +178,32 @@ fn a_recorder_of_all_topics_dates_the_birth_of_each() {
     let listed = text(&[(0, "/early/out"), (0, "/late/out")]);
     assert!(listed.contains("00:30.0  /early started"), "{listed}");
     assert!(listed.contains("00:40.0  /late started"), "{listed}");
+}
+
+#[test]
+fn a_node_starts_when_the_recorder_connects_to_its_log() {
+    let text = |found: &[i64], number: u32, second: i64| {
+        let mut bag = minute(&[("/base", "/odom", 0, 60)]);
+        let mut record = |node: &str, second, number: u32, text: &str, file| {
+            let log = bag.publisher(node, "/rosout", "rosgraph_msgs/Log");
+            LOG.clone_into(&mut bag.publishers[log].definition);
+            let mut record = log1(node, text, file, &[]);
+            record[..4].copy_from_slice(&number.to_le_bytes());
+            at(&mut bag, log, second, record);
+        };
+        for second in found {
+            let text = "Subscribing to /odom";
+            record("/record_1", *second, 7, text, "/src/recorder.cpp");
+        }
+        record("/teleop", second, number, "ready", "teleop.py");
+        sorted(bag)
+    };
+    let started = text(&[0], 2, 30);
+    assert!(started.contains("00:30.0  /teleop started"), "{started}");
+    // Without the log of the recorder's start, this may be a part of a longer recording, and so may what comes at once.
+    assert_eq!(text(&[], 2, 30), "");
+    assert_eq!(text(&[20], 2, 30), "");
+    assert_eq!(text(&[0], 2, 3), "");
 }
 
 #[test]

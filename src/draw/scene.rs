@@ -33,6 +33,8 @@ pub struct Group {
     pub data: Vec<(&'static str, String)>,
     /// Its content in words; empty for none.
     pub title: String,
+    /// The messages per second along its line and against it that dots can show, in hundredths; 0 for none.
+    pub flow: [u32; 2],
     /// The shapes and texts, from back to front.
     pub pieces: Vec<Piece>,
 }

@@ -253,19 +253,26 @@ impl<'a> TopicTimeline<'a> {
         let mut x = begin;
         let end = self.options.size.w / self.scale - left;
         let y = self.drawer.end() + Sizes::SCREEN.line() + 2.0 + LABEL / 2.0;
-        for own in [ink::ADDED, ink::REMOVED, ink::CHANGED, ink::TEXT] {
+        let groups = [ink::ADDED, ink::REMOVED, ink::CHANGED, ink::TEXT].map(|own| {
             let roles = self.source.roles.iter();
             let roles = roles.filter(|(_, nodes)| nodes.iter().find_map(color) == Some(own));
             let names: Vec<String> = roles.map(|(role, _)| role.to_string()).collect();
-            if !names.is_empty() {
-                let fits = |text: &str| canvas.width(text, Type::Small) <= end - x;
-                let text = fitting(&names, names.len(), fits);
-                if x <= begin {
-                    canvas.text(left, y, Type::Small, ink::QUIET, title);
-                }
-                canvas.text(x, y, Type::Small, own, &text);
-                x += canvas.width(&text, Type::Small) + 1.2;
+            (own, names)
+        });
+        let mut groups = groups.iter().filter(|(_, names)| !names.is_empty());
+        while let Some((own, names)) = groups.next() {
+            // Each later colour has at least the number of its nodes.
+            let later = groups.clone().count() as f64 * (canvas.width("+99", Type::Small) + 1.2);
+            let fits = |text: &str| canvas.width(text, Type::Small) <= end - later - x;
+            let mut text = fitting(names, names.len(), fits);
+            if !fits(&text) {
+                text = format!("+{}", names.len());
             }
+            if x <= begin {
+                canvas.text(left, y, Type::Small, ink::QUIET, title);
+            }
+            canvas.text(x, y, Type::Small, *own, &text);
+            x += canvas.width(&text, Type::Small) + 1.2;
         }
     }
 }

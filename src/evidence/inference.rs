@@ -9,12 +9,13 @@ use crate::base::ids::{ById, Few};
 use crate::base::name::{is_log, plain_type};
 use crate::base::rhythm::CLOSE_NS;
 use crate::base::time::{Span, Stamp};
+use crate::evidence::collector::Recorded;
 use crate::evidence::message::dynamic::is_ros1_log;
 use crate::evidence::observation::{
     Confidence, EvidenceLine, LoggedText, Name, Observation, ObservationRecord, Observations,
     SourceId,
 };
-use crate::evidence::times::SeriesId;
+use crate::evidence::times::{SeriesId, Stamps};
 use crate::evidence::{SOURCES, source_word};
 
 /// A connection of one of the bags.
@@ -177,6 +178,8 @@ fn gone(streams: &[Stream]) -> BTreeSet<Option<Name>> {
 #[derive(Default)]
 pub(crate) struct Conclusions<'a> {
     pub(crate) streams: &'a [Stream],
+    /// The log times of the streams' messages.
+    pub(crate) messages: Option<&'a Stamps>,
     pub(crate) facts: Observations,
     pub(crate) inferences: Vec<Inference>,
     /// Statements other than about which elements exist, by time for each element.
@@ -202,7 +205,8 @@ pub(crate) struct Conclusions<'a> {
 }
 
 impl<'a> Conclusions<'a> {
-    pub(crate) fn new(streams: &'a [Stream], facts: Observations, mission: (Stamp, Stamp)) -> Self {
+    pub(crate) fn new(heard: &'a Recorded, mission: (Stamp, Stamp)) -> Self {
+        let (streams, facts) = (&heard.streams[..], heard.facts.clone());
         let mut recorded: ById<Name, Vec<usize>> = ById::default();
         for (at, stream) in streams.iter().enumerate() {
             recorded.grown(stream.topic).push(at);
@@ -213,6 +217,7 @@ impl<'a> Conclusions<'a> {
             recorded,
             offers: offers(&facts.offers, streams),
             streams,
+            messages: Some(&heard.messages),
             facts,
             ..Self::default()
         }

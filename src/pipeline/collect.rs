@@ -6,6 +6,7 @@ use super::{Reading, Watch};
 use crate::bag::straight::{self, ClockFall, Seam, Straightened, Watched};
 use crate::bag::{self, Input, OpenOptions, Report, known_span};
 use crate::base::error::{Error, Result};
+use crate::base::ids::ById;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::Span;
 use crate::base::words;
@@ -42,13 +43,25 @@ pub(super) fn collect(
     let mut all = once(reading, &Copies::default(), &mut merged, verify, watch)?;
     let parts = graph::parts(&all.recorded);
     let pairs = copies::pairs(reading, &all.inputs, &all.recorded, &parts)?;
-    let (shifts, mut notices) = copies::correct(reading, &pairs, &all.inputs);
+    let (mut shifts, mut notices) = copies::correct(reading, &pairs, &all.inputs);
+    let mut again = |shifts: &ById<usize, i64>, left_out: &Copies| {
+        if let Some(merged) = &mut merged {
+            copies::moved(merged, shifts);
+        }
+        once(reading, left_out, &mut merged, verify, watch)
+    };
+    // By a clock that is years apart, all messages of a bag were set aside.
+    let spans = copies::spans(&all.recorded);
+    if shifts
+        .with_ids()
+        .any(|(bag, by)| *by != 0 && spans.some(bag).is_none())
+    {
+        all = again(&shifts, &Copies::default())?;
+        shifts = ById::default();
+    }
     let left_out = copies::copies(&all.recorded, &pairs, &shifts)?;
     if !notices.is_empty() || !left_out.is_empty() {
-        if let Some(merged) = &mut merged {
-            copies::moved(merged, &shifts);
-        }
-        all = once(reading, &left_out, &mut merged, verify, watch)?;
+        all = again(&shifts, &left_out)?;
         all.recorded.parts = parts;
     }
     let offsets = &all.recorded.offsets;

@@ -123,6 +123,9 @@ pub struct Shown {
     pub lifecycle: Option<Arc<str>>,
 }
 
+/// The most messages per second that are shown as dots: with more, they would be closer than can be told apart.
+pub(crate) const FASTEST: f64 = 4.5;
+
 /// The thickest arrow's step: 1 kHz, faster than nearly all topics.
 pub(crate) const STEPS: u8 = 6;
 
@@ -202,6 +205,28 @@ impl Shown {
     /// Whether its messages run along the arrow, and whether they run against it, if it is a bundle.
     pub(crate) fn ways(&self) -> [bool; 2] {
         [0, 1].map(|way| self.topics.iter().any(|row| row.ways[way]))
+    }
+
+    /// Whether messages run along it, and it lasts.
+    pub(crate) fn is_sending(&self) -> bool {
+        self.state == State::Active && !self.is_paused && !self.is_starved && !self.is_ghost()
+    }
+
+    /// The messages per second along the arrow and against it, in hundredths: to two digits, so that a small change is none, and at
+    /// most [`FASTEST`].
+    pub(crate) fn flow(&self) -> [u32; 2] {
+        if !self.is_sending() {
+            return [0, 0];
+        }
+        let rounded = |hz: f64| {
+            let step = if hz < 1.0 { 1.0 } else { 10.0 };
+            cast::to_u32(libm::round(hz.clamp(0.0, FASTEST) * 100.0 / step) * step)
+        };
+        let rows = |way: usize| self.topics.iter().filter(move |row| row.ways[way]);
+        match self.topics.len() {
+            0 => [rounded(self.written_rate().0.unwrap_or(0.0)), 0],
+            _ => [0, 1].map(|way| rounded(rows(way).filter_map(|row| row.hz).sum())),
+        }
     }
 
     /// Whether its rate changed in the window.

@@ -1,14 +1,15 @@
 //! Scenes one after the other as one animated SVG: each group once for each of its looks, visible while it
 //! has that look.
 //!
-//! It runs inside `<img>`, and looks like every other animation. Users who prefer reduced motion, and viewers
+//! It runs inside `<img>`, and looks like every other animation, but for a dot per message that runs along its line. Users who prefer reduced motion, and viewers
 //! without animations, get one of the scenes.
 
 use std::collections::BTreeMap;
 
 use super::svg;
-use super::xml::Xml;
-use crate::draw::scene::{Group, Scene};
+use super::xml::{Xml, hundredth, tenth};
+use crate::draw::scene::{Form, Group, Piece, Scene};
+use crate::draw::style::Color;
 use crate::draw::text::Fonts;
 
 /// Scenes as an animation.
@@ -86,7 +87,9 @@ impl AnimatedScenes {
             xml.leaf("title", title).raw("\n");
         }
         xml.open("style").raw(
-            "@media(prefers-reduced-motion:reduce){.on{visibility:visible!important}.off{visibility:hidden!important}}",
+            ".dots{animation:run linear infinite}@keyframes run{to{stroke-dashoffset:var(--to)}}\
+             @media(prefers-reduced-motion:reduce){.dots{display:none}\
+             .on{visibility:visible!important}.off{visibility:hidden!important}}",
         );
         xml.close().raw("\n");
         svg::ground(&mut xml, &self.first);
@@ -109,6 +112,7 @@ impl AnimatedScenes {
     ) {
         if scenes.len() == self.times.len() {
             svg::write_group(xml, group, Some(fonts));
+            dots(xml, group);
             xml.raw("\n");
             return;
         }
@@ -135,6 +139,7 @@ impl AnimatedScenes {
             group.id = format!("{}..{k}", group.id);
         }
         svg::write_group(xml, &group, Some(fonts));
+        dots(xml, &group);
         xml.close().raw("\n");
     }
 
@@ -154,6 +159,43 @@ impl AnimatedScenes {
         let text = format!("{:.6}", self.sum(at) / self.whole().max(1.0));
         let text = text.trim_end_matches('0').trim_end_matches('.');
         text.to_owned()
+    }
+}
+
+/// The speed of dots, in pixels a second: that of a walk across a picture of a README in 20 s.
+const SPEED: f64 = 36.0;
+
+/// Writes a dot per message on the line of a group, at the pace of its messages.
+fn dots(xml: &mut Xml, group: &Group) {
+    let line = group.pieces.iter().find_map(|piece| match piece {
+        Piece::Shape(shape) if shape.fill == Color::NONE => match &shape.form {
+            Form::Path(steps) => Some((steps, &shape.stroke)),
+            _ => None,
+        },
+        _ => None,
+    });
+    let Some((steps, stroke)) = line else { return };
+    for (flow, back) in group.flow.iter().zip([-1.0, 1.0]) {
+        if *flow == 0 {
+            continue;
+        }
+        let apart = SPEED * 100.0 / f64::from(*flow);
+        let (gap, seconds) = (tenth(apart), hundredth(apart / SPEED));
+        let to = tenth(back * apart);
+        xml.open("path")
+            .attribute("class", "dots")
+            .attribute("d", svg::PathSteps(steps))
+            .attribute("fill", "none")
+            .attribute("stroke", stroke.color)
+            .attribute("stroke-width", hundredth(stroke.width + 2.8))
+            .attribute("stroke-linecap", "round")
+            .attribute(
+                "style",
+                format_args!(
+                    "--to:{to}px;stroke-dasharray:.01 {gap};animation-duration:{seconds}s"
+                ),
+            )
+            .close_empty();
     }
 }
 
@@ -191,6 +233,26 @@ mod tests {
         assert!(
             still.len() == 2 && still[0].contains("id=\"b..1\"") && still[1].contains("id=\"c\"")
         );
+    }
+
+    #[test]
+    fn dots_run_both_ways_at_the_pace_of_the_messages() {
+        use crate::base::geometry::Point;
+        use crate::draw::scene::{Shape, Step, Stroke};
+
+        let (mut scene, ms) = scene(&[("a", "edge")]);
+        let steps = [0.0, 90.0].map(|x| Step::Line(Point::new(x, 0.0)));
+        let line = Shape::line(
+            Form::Path(steps.into()),
+            Stroke::solid(Color::of([0, 0, 0]), 1.0),
+        );
+        scene.groups[0].shape(line);
+        scene.groups[0].flow = [200, 450];
+        let film = AnimatedScenes::new([(scene, ms)].into_iter());
+        let svg = film.write("film", 0);
+        assert_eq!(svg.matches("class=\"dots\"").count(), 2);
+        assert!(svg.contains("--to:-18px;stroke-dasharray:.01 18;animation-duration:0.5s"));
+        assert!(svg.contains("--to:8px;stroke-dasharray:.01 8;animation-duration:0.22s"));
     }
 
     #[test]

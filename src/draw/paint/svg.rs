@@ -144,7 +144,7 @@ impl Display for Corners<'_> {
 }
 
 /// The steps of a path: `M0 1C0 1 2 3 2 3Z`.
-struct PathSteps<'a>(&'a [Step]);
+pub(super) struct PathSteps<'a>(pub(super) &'a [Step]);
 
 impl Display for PathSteps<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -208,6 +208,11 @@ impl GraphPen<'_> {
             id: format!("{}..over", group.id),
             ..group.clone()
         };
+        group.flow = match (&arrow.kind, ends[0]) {
+            // The messages of a topic run on to all its subscribers.
+            (ArrowKind::Subscribe, Some(topic)) if shown.is_sending() => topic.flow(),
+            _ => shown.flow(),
+        };
         let glow = Group::new(format!("{}..glow", group.id), "glow");
         let mut glow = glow.with(vec![("of", group.id.clone())]);
         let tip = match arrow.kind {

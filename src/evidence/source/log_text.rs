@@ -4,6 +4,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::base::ids::grouped;
 use crate::base::name::{is_feedback, is_log, resolved};
 use crate::base::rhythm::{DISCOVERY_NS, FOUND_NS, REGISTRATION_NS};
 use crate::base::time::Stamp;
@@ -12,6 +13,7 @@ use crate::evidence::inference::{
 };
 use crate::evidence::message::dynamic::{LogRecord, is_ros1_log};
 use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
+use crate::evidence::source::rosout::is_log_of_all;
 use crate::evidence::source::{SHARED, SourceContext};
 use crate::evidence::source_id;
 
@@ -273,6 +275,71 @@ pub(crate) fn conclude_births(source: SourceId, known: &mut Conclusions<'_>) {
             });
         }
     }
+}
+
+// The log of a node of ROS 1 is latched: a recorder that connects to it gets the last record at once. A node whose first record comes
+// long after the recorder has connected to what was there, and is not the node's first, has just started. For example, `/teleop`
+// first logs at 101.2 s, with number 2: it sent number 1 before the recorder was connected, and would otherwise have been there at 0 s.
+
+pub(crate) fn conclude_connected(source: SourceId, known: &mut Conclusions<'_>) {
+    let recordings = recordings(known);
+    for fact in known.observed(source_id("rosout")) {
+        let Observation::Continues(node) = fact.observation else {
+            continue;
+        };
+        let Some(time) = known.times(&fact).first().copied() else {
+            continue;
+        };
+        let mut before = recordings.iter().filter(|(start, _)| *start <= time);
+        let is_connected = before.clone().any(|(_, is_whole)| *is_whole);
+        if is_connected && before.all(|(start, _)| time.since(*start) > 2 * FOUND_NS) {
+            let when = Validity::Begins {
+                signs: vec![time],
+                ends: Vec::new(),
+            };
+            let what = ElementKey::Node(node);
+            let inference = Inference::new(source, what, Confidence::Stated, when);
+            known.because(inference, Some(time), |known| {
+                let node = known.text(node);
+                format!("the recorder connected to the log of {node} then, after its first record")
+            });
+        }
+    }
+}
+
+/// The start of each recording, and whether its recorder started then: its log names most of the topics that are in it from the start.
+fn recordings(known: &mut Conclusions<'_>) -> Vec<(Stamp, bool)> {
+    let mut named: BTreeSet<(Name, Stamp)> = BTreeSet::new();
+    for fact in known.observed(source_id("links")) {
+        if let Observation::Appears(topic) = fact.observation {
+            let times = known.times(&fact).into_iter();
+            named.extend(times.map(|time| (topic, time)));
+        }
+    }
+    let first = |stream: &Stream| {
+        let (first, _) = known.messages?.bounds(stream.times)?;
+        Some((stream.bag, (first, stream.topic)))
+    };
+    let bags = grouped(known.streams.iter().filter_map(first));
+    let recording = |topics: &Vec<(Stamp, Name)>| {
+        let start = topics.iter().map(|one| one.0).min()?;
+        let end = start.plus(FOUND_NS);
+        let early = topics.iter().filter(|(first, _)| *first <= end);
+        let early: BTreeSet<Name> = early.map(|one| one.1).collect();
+        let is_named = |topic: &Name| {
+            named
+                .range((*topic, start)..=(*topic, end))
+                .next()
+                .is_some()
+        };
+        // The recorder receives its own records only after it has subscribed to the log.
+        let others = early
+            .into_iter()
+            .filter(|topic| !is_log_of_all(known, *topic));
+        let (found, missed): (Vec<Name>, Vec<Name>) = others.partition(is_named);
+        Some((start, found.len() >= missed.len()))
+    };
+    bags.values().filter_map(recording).collect()
 }
 
 // A topic that the recorder finds while a single node starts is of that node. For example, `/teleop` declares its parameters at

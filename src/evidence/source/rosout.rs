@@ -23,11 +23,20 @@ pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
     context.states(Observation::Node(node), logs);
     let log = context.stream.topic;
     if is_log(context.stream.connection.topic.as_str()) {
-        if record.number.is_some_and(|number| number <= FIRST_RECORD) {
+        let is_own = context.stream.publisher == Some(node);
+        let publishes = Observation::Publish(node, log);
+        let is_first = is_own && !context.facts.has(context.source, publishes);
+        // A relay of `topic_tools` logs this when its input begins, however long it has waited.
+        let number = record
+            .number
+            .filter(|_| !text.starts_with("advertised as "));
+        if number.is_some_and(|number| number <= FIRST_RECORD) {
             let begins = || format!("{name} logs its first record: {text}");
             context.states(Observation::Begins(node), begins);
+        } else if number.is_some() && is_first {
+            context.states(Observation::Continues(node), String::new);
         }
-        context.states(Observation::Publish(node, log), logs);
+        context.states(publishes, logs);
         let is_host = |host: &Name| *host != node && !is_player(&context.facts.text(*host));
         if let Some(host) = context.stream.publisher.filter(is_host) {
             context.states(Observation::Carries(host, node), String::new);
@@ -186,11 +195,15 @@ const MOST_SILENT: usize = 10;
 /// Whether the recorder's log is whole, because it names all recorded topics, and the messages are not played back. The
 /// recorder receives no records of its own from before it subscribes to the log, and may lose one more.
 fn names_all(known: &Conclusions<'_>, named: &BTreeSet<Name>) -> bool {
-    let is_log = |topic: Name| LOGS.iter().any(|log| known.text(topic).ends_with(log));
-    let unnamed = |topic: &Name| !named.contains(topic) && !is_log(*topic);
+    let unnamed = |topic: &Name| !named.contains(topic) && !is_log_of_all(known, *topic);
     let recorded: BTreeSet<Name> = known.streams.iter().map(|s| s.topic).collect();
     let is_played = known.streams.iter().any(|s| s.trust == Reliability::Player);
     !named.is_empty() && !is_played && recorded.into_iter().filter(unnamed).count() <= 1
+}
+
+/// Whether a topic is the log, which the recorder receives its own records from only after it has subscribed to it.
+pub(crate) fn is_log_of_all(known: &Conclusions<'_>, topic: Name) -> bool {
+    LOGS.iter().any(|log| known.text(topic).ends_with(log))
 }
 
 // Log records of ROS 2: a node is running. Dots represent slashes; the loggers of a node's parts count as the node.

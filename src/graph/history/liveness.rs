@@ -40,6 +40,10 @@ pub(crate) fn collect(
     let findings = &*findings;
     for inference in inferences {
         let [node, topic] = inference.what.ends();
+        let with_input = |topic: Option<Name>| {
+            let known = node.zip(topic).and_then(|key| forwarded.get(&key));
+            known.copied().unwrap_or_default()
+        };
         let own = node.map_or(&[][..], |node| restarts.of(node));
         let deaths: Vec<Stamp> = own.iter().map(|r| r.death).collect();
         let liveness = liveness_of.entry(inference.what).or_default();
@@ -58,8 +62,7 @@ pub(crate) fn collect(
                     continue;
                 }
                 let place = senders.place(*at).unwrap_or(0);
-                let with = node.and_then(|node| forwarded.get(&(node, stream.topic)));
-                let (with_start, with_end) = with.copied().unwrap_or_default();
+                let (with_start, with_end) = with_input(Some(stream.topic));
                 let name = stream.connection.topic.as_str();
                 let is_free = is_log(name) || is_feedback(name);
                 let what = Followed {
@@ -109,11 +112,15 @@ pub(crate) fn collect(
             Validity::Begins { signs, ends } => {
                 let ends = together(ends, &deaths);
                 liveness.bound_all(signs, &ends);
+                // Relays of ROS 1 advertise their topic when their input sends its first message.
+                let (is_late, _) = with_input(topic);
                 // Earlier messages of the node may have another's name.
-                if !is_rewritten || !is_from(&inference, "rosout") {
+                if !is_late && (!is_rewritten || !is_from(&inference, "rosout")) {
                     liveness.begins.extend(signs);
                 }
-                if is_from(&inference, "links") || is_from(&inference, "parameter_events") {
+                let is_found =
+                    is_from(&inference, "links") || is_from(&inference, "parameter_events");
+                if is_found && !is_late {
                     liveness.found.extend(signs);
                 }
             }
