@@ -41,10 +41,8 @@ impl Engine for LayoutRs {
     fn lay_out(&self, plan: &Plan, options: &LayoutOptions) -> Result<Layout> {
         let hint = "use `--layout layered`, or show fewer elements";
         if plan.vertices.len() > MOST {
-            return Err(Error::usage(
-                format!("layout-rs is too slow for more than {MOST} elements"),
-                hint,
-            ));
+            let what = format!("layout-rs is too slow for more than {MOST} elements");
+            return Err(Error::usage(what, hint));
         }
         let orientation = options.orientation.unwrap_or(Orientation::LeftRight);
         // It checks its preconditions with `assert!`.
@@ -91,10 +89,8 @@ fn lay_out(plan: &Plan, options: &LayoutOptions, orientation: Orientation) -> Re
         Some((task, block(task)?))
     });
     let blocks = blocks.collect::<Option<Vec<_>>>().ok_or_else(|| {
-        Error::usage(
-            "layout-rs placed boxes on top of each other",
-            "use `--layout layered`",
-        )
+        let what = "layout-rs placed boxes on top of each other";
+        Error::usage(what, "use `--layout layered`")
     })?;
     let (_, mut layout) = assembled(&flat, options, &blocks, orientation);
     layout.clusters = vec![Rect::default(); plan.clusters.len()];
@@ -149,32 +145,17 @@ fn places(
         TheirPoint::new(size.w, size.h)
     };
     for item in 0..layers.kind.len() {
-        let vertex = layers.kind[item] == LayerItem::Vertex;
-        let (size, halo) = if vertex {
+        let (flipped, zero) = (direction.flip(), TheirPoint::zero());
+        let (mut element, size, halo) = if layers.kind[item] == LayerItem::Vertex {
             let size = room.size[item];
-            (
-                Size::new(size.w, size.h + 2.0 * room.loop_room(item)),
-                BOX_HALO,
-            )
+            let size = point(Size::new(size.w, size.h + 2.0 * room.loop_room(item)));
+            let (shape, look) = (ShapeKind::new_box(""), StyleAttr::simple());
+            (Element::create(shape, look, flipped, size), size, BOX_HALO)
         } else {
-            (Size::new(1.0, 1.0), EDGE_HALO)
+            let connector = Element::empty_connector(flipped);
+            (connector, point(Size::new(1.0, 1.0)), EDGE_HALO)
         };
-        let mut element = if vertex {
-            Element::create(
-                ShapeKind::new_box(""),
-                StyleAttr::simple(),
-                direction.flip(),
-                point(size),
-            )
-        } else {
-            Element::empty_connector(direction.flip())
-        };
-        element.pos = Position::new(
-            TheirPoint::zero(),
-            point(size),
-            TheirPoint::zero(),
-            point(halo),
-        );
+        element.pos = Position::new(zero, size, zero, point(halo));
         graph.add_node(element);
     }
     for (item, after) in layers.down.iter().enumerate() {

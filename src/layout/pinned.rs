@@ -68,29 +68,18 @@ struct PinnedBoxes<'a> {
 impl PinnedBoxes<'_> {
     fn is_free(&self, place: &Rect, gap: f64) -> bool {
         let place = place.grown(gap);
-        !self
-            .boxes
-            .iter()
-            .flatten()
-            .any(|other| other.overlaps(&place))
+        let mut others = self.boxes.iter().flatten();
+        !others.any(|other| other.overlaps(&place))
     }
 
     /// A free position near the neighbours, or else near the cluster, or else below everything.
     fn place_for(&mut self, v: usize, neighbours: &[usize]) -> Rect {
         let size = self.plan.vertices[v].size;
-        let below = self
-            .boxes
-            .iter()
-            .flatten()
-            .map(Rect::bottom)
-            .fold(0.0, f64::max)
-            + 3.0 * GAP;
+        let bottoms = self.boxes.iter().flatten().map(Rect::bottom);
+        let below = bottoms.fold(0.0, f64::max) + 3.0 * GAP;
         let last = Rect::new(PADDING, below, size.w, size.h);
-        let mut near: Vec<Point> = neighbours
-            .iter()
-            .filter_map(|&u| self.boxes[u])
-            .map(|rect| rect.centre())
-            .collect();
+        let near = neighbours.iter().filter_map(|&u| self.boxes[u]);
+        let mut near: Vec<Point> = near.map(|rect| rect.centre()).collect();
         if let Some(cluster) = self.plan.vertices[v].cluster {
             let frame = self.frames()[cluster];
             if frame.w > 0.0 {
@@ -106,11 +95,8 @@ impl PinnedBoxes<'_> {
         });
         for ring in 0..RINGS {
             for (x, y) in around(ring) {
-                let middle = Point::new(
-                    goal.x + f64::from(x) * STEP.w,
-                    goal.y + f64::from(y) * STEP.h,
-                );
-                let place = Rect::around(middle, size);
+                let (x, y) = (f64::from(x) * STEP.w, f64::from(y) * STEP.h);
+                let place = Rect::around(Point::new(goal.x + x, goal.y + y), size);
                 let inside = place.x >= PADDING && place.y >= PADDING;
                 if inside && self.is_free(&place, GAP) && self.keeps_clusters(v, place) {
                     return place;

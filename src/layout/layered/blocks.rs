@@ -15,6 +15,7 @@ use crate::layout::routes::{PORT_STEP, PORTS};
 use crate::layout::spacing::{PADDING, turned};
 use crate::layout::{
     Component, Layout, LayoutOptions, Link, Orientation, Outline, PartTask, Plan, Route, Vertex,
+    around,
 };
 
 /// The shapes, width over height, of the pages on which the contents of namespaces are laid out: columns, squares, rows.
@@ -184,7 +185,7 @@ struct Cut {
 
 impl Cut {
     fn new(part: &Component) -> Option<Self> {
-        let outermost = |home: &usize| part.around(*home).last().unwrap_or(0);
+        let outermost = |home: &usize| around(&part.parent, *home).last().unwrap_or(0);
         let space: Vec<usize> = part.home.iter().map(outermost).collect();
         let spaces: BTreeSet<usize> = space.iter().copied().filter(|space| *space != 0).collect();
         let is_between = |link: &usize| {

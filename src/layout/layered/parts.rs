@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::PlacedPart;
 use crate::base::geometry::{Point, Rect};
 use crate::layout::layers::common;
-use crate::layout::{Cluster, Component, Layout, Link, Plan, Route};
+use crate::layout::{Cluster, Component, Layout, Link, Plan, Route, around};
 
 /// The parts of a plan without links between them, in the order of their first vertices.
 pub(crate) fn parts(plan: &Plan) -> Vec<Component> {
@@ -129,10 +129,11 @@ impl Subplan {
                 });
             }
         }
-        let outer: BTreeSet<usize> = part.around(root).collect();
+        let outer: BTreeSet<usize> = around(&part.parent, root).collect();
         let mut used = BTreeSet::new();
         for &v in &vertices {
-            used.extend(part.around(part.home[v]).filter(|c| !outer.contains(c)));
+            let own = around(&part.parent, part.home[v]);
+            used.extend(own.filter(|c| !outer.contains(c)));
         }
         let clusters: Vec<usize> = used.into_iter().collect();
         let number = |c: usize| clusters.binary_search(&c).ok();
@@ -185,11 +186,6 @@ impl PlacedPart {
 }
 
 impl Component {
-    /// A cluster and those around it, the innermost first, without the outside.
-    pub(crate) fn around(&self, cluster: usize) -> impl Iterator<Item = usize> + '_ {
-        std::iter::successors(Some(cluster), |&c| Some(self.parent[c])).take_while(|&c| c != 0)
-    }
-
     /// The innermost cluster around everything; 0 if there is none.
     pub(crate) fn root(&self) -> usize {
         let homes = self.home.iter().copied();

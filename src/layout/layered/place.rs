@@ -363,11 +363,8 @@ impl Monotone {
         for (goal, weight) in goals {
             let mut pool = Pool::new(goal * weight, weight, 1);
             while let Some(last) = self.pools.pop_if(|last| last.mean > pool.mean) {
-                pool = Pool::new(
-                    pool.sum + last.sum,
-                    pool.weight + last.weight,
-                    pool.count + last.count,
-                );
+                let (sum, weight) = (pool.sum + last.sum, pool.weight + last.weight);
+                pool = Pool::new(sum, weight, pool.count + last.count);
             }
             self.pools.push(pool);
         }

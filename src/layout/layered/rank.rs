@@ -176,21 +176,13 @@ fn greedy_order(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
         .collect();
     while let Some(rank) = left.pop_first() {
         let v = rank.vertex();
-        let end = if matches!(rank, Rank::Sink(_)) {
-            &mut last
-        } else {
-            &mut first
-        };
-        end.push(v);
-        for (ends, count_outgoing) in [(&before[v], true), (&after[v], false)] {
+        let is_sink = matches!(rank, Rank::Sink(_));
+        if is_sink { &mut last } else { &mut first }.push(v);
+        for (ends, is_before) in [(&before[v], 1), (&after[v], 0)] {
             for &u in ends {
                 let was_left = left.remove(&Rank::of(u, outgoing[u], incoming[u]));
-                let count = if count_outgoing {
-                    &mut outgoing[u]
-                } else {
-                    &mut incoming[u]
-                };
-                *count -= 1;
+                outgoing[u] -= is_before;
+                incoming[u] -= 1 - is_before;
                 if was_left {
                     left.insert(Rank::of(u, outgoing[u], incoming[u]));
                 }
@@ -221,10 +213,10 @@ impl Rank {
         match (outgoing, incoming) {
             (0, _) => Self::Sink(vertex),
             (_, 0) => Self::Source(vertex),
-            _ => Self::Between(
-                Reverse(outgoing.cast_signed() - incoming.cast_signed()),
-                vertex,
-            ),
+            _ => {
+                let surplus = outgoing.cast_signed() - incoming.cast_signed();
+                Self::Between(Reverse(surplus), vertex)
+            }
         }
     }
 
