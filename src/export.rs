@@ -36,7 +36,7 @@ pub(crate) use encoder::Pack;
 pub use encoder::Written;
 use encoder::{DATA, GRAPH, IMAGE, LOOK, PICTURE, WORDS};
 pub use encoder::{DrawnFrame, Encoder, Needs, OneDrawing, OutputFormat, Packet};
-pub(crate) use encoder::{Started, at_end, one_file, one_text, text_per_window};
+pub(crate) use encoder::{Started, one_drawing, one_file, one_text, text_per_window};
 use tables::TableFormat;
 use target::Target;
 pub(crate) use tex::needs_figure;

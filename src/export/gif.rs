@@ -68,7 +68,7 @@ impl Encoder for GifFile {
         Ok(())
     }
 
-    fn take(&mut self, _: usize, frame_time: FrameTime, packet: Packet) -> Result<()> {
+    fn take(&mut self, frame_time: FrameTime, packet: Packet) -> Result<()> {
         let failed = self.error();
         match &mut self.animation {
             Some(animation) => animation.add(packet, frame_time.ms).map_err(failed),

@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use super::sequence::{Sequence, UnionDrawings};
+use super::sequence::Sequence;
 use super::target::Target;
 use super::{Started, one_text};
 use crate::base::digest;
@@ -116,11 +116,11 @@ fn page(sequence: &Sequence<'_>, style: &Style) -> String {
     };
     let overview = sequence.picture.overview();
     // A chosen style is always used; the default one has a dark variant.
-    let chosen = whole.as_ref().map_or(style, |(_, drawn)| drawn.style);
+    let chosen = whole.as_ref().map_or(style, |(_, (_, style))| style);
     let dark = Style::builtin("dark").ok().filter(|_| chosen == style);
     let timeline = overview.as_ref().map_or("", |o| &o.title);
     let title = sequence.picture.title().unwrap_or(timeline);
-    let graph = |(view, drawn): (_, UnionDrawings<'_>)| PageGraph::new(view, drawn.union);
+    let graph = |(view, (union, _)): (_, (Union, _))| PageGraph::new(view, union);
     // The timeline of topics has a row for each, even if a graph would group them.
     let each = sequence.unfolded.map_or(sequence.view, |u| u.view);
     let page = HtmlPage {

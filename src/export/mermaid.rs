@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::io::Write as _;
 
-use super::{Started, at_end, text_per_window};
+use super::{Started, text_per_window};
 use crate::base::words;
 use crate::draw::picture::{options, short_name};
 use crate::draw::style::{Body, Change, Color, Style};
@@ -19,11 +19,8 @@ pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<
         .paired
         .filter(|_| is_large)
         .unwrap_or(sequence.view);
-    let target = target.clone();
-    Ok(at_end(move || {
-        text_per_window(view, &target, |sink, seen| {
-            sink.write_all(chart(view, &style, seen).as_bytes())
-        })
+    Ok(text_per_window(view, target, move |sink, seen| {
+        sink.write_all(chart(view, &style, seen).as_bytes())
     }))
 }
 

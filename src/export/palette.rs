@@ -141,7 +141,6 @@ impl Palette {
 const MET: u32 = 4096;
 
 /// Finds the palette indices of colours, with a cache.
-#[derive(Clone, Debug)]
 pub(crate) struct Matcher<'a> {
     palette: &'a Palette,
     met: Vec<Option<(Rgb, u8)>>,

@@ -11,7 +11,6 @@ use crate::base::error::{Error, Result};
 use crate::base::file::Leftover;
 
 /// A file (or standard output) in progress. Dropped without [`OutputSink::commit`], a file is removed.
-#[derive(Debug)]
 pub(crate) struct OutputSink {
     /// The path as given.
     path: PathBuf,
@@ -22,7 +21,6 @@ pub(crate) struct OutputSink {
     limit: u64,
 }
 
-#[derive(Debug)]
 enum SinkTarget {
     Stdout(io::Stdout),
     /// An existing device or pipe, which is not renamed.

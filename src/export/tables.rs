@@ -14,7 +14,7 @@ use super::parquet;
 use super::sequence::Sequence;
 use super::sink::OutputSink;
 use super::target::{Target, is_special};
-use super::{Started, Written, at_end};
+use super::{Started, Written};
 use crate::base::csv;
 use crate::base::error::{Error, Result};
 use crate::base::file::Leftover;
@@ -58,7 +58,7 @@ pub(crate) fn start<'a>(
 ) -> Started<'a> {
     check(target)?;
     let target = target.clone();
-    Ok(at_end(move || {
+    Ok(Box::new(move || {
         let each = TABLES.iter().zip(files(&target, format.word()));
         let write = |(table, file): (&Table, Target)| {
             let rows = |row: RowTaker<'_>| (table.fill)(sequence.data, row);
@@ -401,7 +401,6 @@ fn time(stamp: Option<Stamp>) -> TableCell<'static> {
 // A folder of tables in progress: hidden until all of them are complete, with few files open at a time.
 
 /// Files that appear together in a folder. Dropped without [`Folder::commit`], they are removed.
-#[derive(Debug)]
 pub(crate) struct Folder {
     path: PathBuf,
     hidden: TempDir,
@@ -413,7 +412,6 @@ pub(crate) struct Folder {
 }
 
 /// Folders created for the files, the outermost first. Those still empty on drop are removed.
-#[derive(Debug)]
 struct Made(Vec<PathBuf>);
 
 impl Drop for Made {
