@@ -139,6 +139,12 @@ impl<'a> Measured<'a> {
         &self.graph.plan
     }
 
+    /// The legend, equal in every frame, and its place on the page.
+    pub(crate) fn legend(&self) -> (Group, Rect) {
+        let legend = legend::legend(&self.legend, self.style, &self.page);
+        (legend, self.page.legend)
+    }
+
     /// The options for the layout engine that follow from the page.
     pub fn layout_options(&self) -> layout::LayoutOptions {
         layout::LayoutOptions {
@@ -157,7 +163,8 @@ impl<'a> Measured<'a> {
     pub(crate) fn smallest_text(&self) -> f64 {
         let (style, graph) = (self.style, &self.graph);
         let mut smallest = style.topic.size.min(style.node.size);
-        if graph.rated.contains(&true) || !graph.footers.is_empty() {
+        let is_labelled = graph.plan.links.iter().any(|link| link.label.is_some());
+        if is_labelled || !graph.footers.is_empty() {
             smallest = smallest.min(style.edge.size);
         }
         if graph.labels.iter().any(|l| l.second) || !self.view.rows.is_empty() {
@@ -299,8 +306,7 @@ impl Picture<'_> {
         if !measured.options.bare {
             groups.push(self.title.ground());
             if measured.options.has_legend {
-                let (legend, style) = (&measured.legend, measured.style);
-                groups.push(legend::legend(legend, style, &measured.page));
+                groups.push(measured.legend().0);
             }
             if measured.options.strip(measured.view) != Strip::Nothing {
                 groups.extend(self.timeline.ground());

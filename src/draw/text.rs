@@ -74,9 +74,8 @@ impl Face {
 /// The fonts with which labels are measured and drawn: the bundled one, then the user's. Cheap to clone.
 #[derive(Clone, Debug)]
 pub struct Fonts {
-    regular: Arc<Face>,
-    semibold: Arc<Face>,
-    extra: Vec<Arc<Face>>,
+    /// Regular and `SemiBold`, then the user's.
+    faces: Vec<Arc<Face>>,
 }
 
 impl Default for Fonts {
@@ -101,9 +100,7 @@ impl Fonts {
                 Arc::new(Face::read(Cow::Borrowed(data)).unwrap_or(broken))
             };
             Fonts {
-                regular: face(REGULAR),
-                semibold: face(SEMIBOLD),
-                extra: Vec::new(),
+                faces: vec![face(REGULAR), face(SEMIBOLD)],
             }
         });
         BUNDLED.clone()
@@ -119,41 +116,32 @@ impl Fonts {
             let reason = "no TrueType or OpenType font with characters";
             Error::bad_file(path, 0, reason, "give `--font` a .ttf, .otf or .ttc file")
         })?;
-        self.extra.push(Arc::new(face));
+        self.faces.push(Arc::new(face));
         Ok(self)
     }
 
     /// The bytes of the font files: Regular, `SemiBold`, then the user's.
     pub fn files(&self) -> impl Iterator<Item = &[u8]> {
-        [&self.regular, &self.semibold]
-            .into_iter()
-            .chain(&self.extra)
-            .map(|face| &*face.data)
+        self.faces.iter().map(|face| &*face.data)
+    }
+
+    /// The fonts of a weight with their indices in [`Fonts::files`], the one to use first.
+    fn of(&self, weight: Weight) -> impl Iterator<Item = (usize, &Face)> {
+        let all = self.faces.iter().enumerate();
+        let own = all.filter(move |(at, _)| *at == weight as usize || *at > 1);
+        own.map(|(at, face)| (at, &**face))
     }
 
     /// The index in [`Fonts::files`] of the font that draws `c` in this weight; that of the weight if no font
     /// has it.
     pub fn file_of(&self, c: char, weight: Weight) -> usize {
-        let (place, first) = match weight {
-            Weight::Regular => (0, &self.regular),
-            Weight::SemiBold => (1, &self.semibold),
-        };
-        if first.advance(c).is_some() {
-            return place;
-        }
-        let extra = self.extra.iter().position(|f| f.advance(c).is_some());
-        extra.map_or(place, |at| at + 2)
+        let found = self.of(weight).find(|(_, face)| face.advance(c).is_some());
+        found.map_or(weight as usize, |(at, _)| at)
     }
 
     /// The width of `c` in em; `None` if no font has it.
     fn advance(&self, c: char, weight: Weight) -> Option<f32> {
-        let first = match weight {
-            Weight::Regular => &self.regular,
-            Weight::SemiBold => &self.semibold,
-        };
-        std::iter::once(first)
-            .chain(&self.extra)
-            .find_map(|face| face.advance(c))
+        self.of(weight).find_map(|(_, face)| face.advance(c))
     }
 
     /// The width of `text` in pixels at a font size of `size` pixels; exact for the bundled font, which has no kerning.

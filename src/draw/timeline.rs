@@ -20,7 +20,7 @@ use std::sync::Arc;
 use crate::base::name::{is_quiet, last_part};
 use crate::base::time::Span;
 use crate::evidence::Confidence;
-use crate::graph::{ById, EdgeId, Element, Node, NodeId, TopicId};
+use crate::graph::{ById, EdgeId, Element, NodeId, TopicId};
 use crate::mission::Mission;
 use crate::mission::event_log::{Interruption, Phase};
 use crate::mission::phases::knows_publishers;
@@ -137,11 +137,6 @@ impl<'a> FigureSource<'a> {
     /// Whether at least half of the messages have a known publisher; else rows are topics.
     pub(crate) fn knows_publishers(&self) -> bool {
         knows_publishers(&self.mission.elements, &self.mission.sending)
-    }
-
-    /// Whether the mission has no nodes but recorders and players, without regard to filters.
-    pub(crate) fn knows_no_node(&self) -> bool {
-        self.mission.elements.nodes.iter().all(Node::is_tool)
     }
 
     pub(crate) fn shows(&self, topic: TopicId) -> bool {

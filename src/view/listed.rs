@@ -264,7 +264,6 @@ pub(crate) fn also_here(
 }
 
 /// The drawn part of a view. Its windows are left out.
-#[derive(Debug)]
 pub(crate) struct DrawnPart {
     /// The boxes and arrows that are drawn, and the other items as words.
     pub(crate) view: View,

@@ -93,10 +93,8 @@ fn names(elements: &Elements) -> [Vec<&str>; 2] {
 /// The error of a view without any of these elements.
 pub(crate) fn nothing(elements: &Elements) -> Error {
     let all = words::count(elements.nodes.len() + elements.topics.len(), "name");
-    Error::usage(
-        format!("nothing is left to draw of {all}"),
-        "show more with `--hide none` or wider filters",
-    )
+    let what = format!("nothing is left to draw of {all}");
+    Error::usage(what, "show more with `--hide none` or wider filters")
 }
 
 /// Checks that each filter of names matches an element.

@@ -310,14 +310,12 @@ pub(crate) fn headline(mission: &Mission, elements: String) -> Vec<Phrase> {
     let (phases, restarts) = (mission.log.phases.len(), many(Kind::Restarted));
     let hands = many(Kind::HandedOver);
     let change = if hands == 1 { "changes" } else { "change" };
+    let topics = words::count(hands, "topic");
     let parts = [
         (true, elements),
         (phases > 1, words::count(phases, "phase")),
         (restarts > 0, words::count(restarts, "restart")),
-        (
-            hands > 0,
-            format!("{} {change} hands", words::count(hands, "topic")),
-        ),
+        (hands > 0, format!("{topics} {change} hands")),
     ];
     let parts = parts.into_iter().filter(|(is_told, _)| *is_told);
     let parts: Vec<String> = parts.map(|(_, words)| words).collect();

@@ -26,10 +26,12 @@ pub(crate) fn caption(
     }
     if let Some(bag) = source.mission.bags.first() {
         let length = words::duration(source.span().nanos());
-        let name = escaped(&words::visible(&bag.name));
+        let (name, version) = (
+            escaped(&words::visible(&bag.name)),
+            env!("CARGO_PKG_VERSION"),
+        );
         parts.push(format!(
-            "Bag \\texttt{{{name}}}, {length}; bagreel {}.",
-            env!("CARGO_PKG_VERSION")
+            "Bag \\texttt{{{name}}}, {length}; bagreel {version}."
         ));
     }
     if options.is_bare {

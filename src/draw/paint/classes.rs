@@ -13,7 +13,6 @@ use crate::graph::Id as _;
 use crate::view::{ArrowId, ItemId, Mark, STEPS, View, decades};
 
 /// A graph in SVG.
-#[derive(Debug)]
 pub(crate) struct Classes<'a> {
     pub(crate) view: &'a View,
     pub(crate) union: &'a Union,

@@ -153,10 +153,7 @@ struct PixelSheet {
 impl PixelSheet {
     /// An empty page for the scene.
     fn of(scene: &Scene, scale: f64) -> Result<Self> {
-        let (w, h) = (
-            libm::round(scene.size.w * scale),
-            libm::round(scene.size.h * scale),
-        );
+        let [w, h] = [scene.size.w, scene.size.h].map(|side| libm::round(side * scale));
         if !(w >= 1.0 && h >= 1.0 && w <= MOST_SIDE && h <= MOST_SIDE && w * h <= MOST_PIXELS) {
             let hint = "use a `--size` of at most 65535 per side and 64 million pixels, such as `1920x1080`";
             return Err(Error::usage(
@@ -548,7 +545,6 @@ impl PixelSheet {
 const SIDE: f64 = 32.0;
 
 /// A set of tiles of one page.
-#[derive(Clone, Debug, PartialEq, Eq)]
 struct Tiles {
     columns: usize,
     rows: usize,

@@ -1,6 +1,6 @@
 //! Publications and subscriptions: their routes, rates and signs of change.
 
-use super::options::{self, ArrowLook};
+use super::options::{self, Paint};
 use super::texts::{self, LINE, arrow_label, class, reported};
 use super::{GraphFit, GraphPen, badge};
 use crate::base::geometry::{Point, Rect, Size, after, on_cubic, polyline};
@@ -191,7 +191,7 @@ impl GraphPen<'_> {
         shown: &Shown,
         ends: [Option<&Shown>; 2],
     ) -> [Group; 3] {
-        let look = options::of_arrow(self.style, &arrow.kind, shown, shown.steady_hz);
+        let look = options::of_arrow(self.style, &arrow.kind, shown);
         let [from, to] = &track.ends;
         let kind = arrow.kind.word();
         let class = class(&format!("edge {}", arrow.class()), shown);
@@ -247,7 +247,7 @@ impl GraphPen<'_> {
         &self,
         [glow, group]: [&mut Group; 2],
         track: &ArrowPath,
-        look: &ArrowLook,
+        look: &Paint,
         kind: Tip,
         heads: [bool; 2],
     ) {
@@ -296,7 +296,7 @@ impl GraphPen<'_> {
     }
 
     /// The rows of its topics, one below the other.
-    fn rows(&self, group: &mut Group, track: &ArrowPath, shown: &Shown, look: &ArrowLook) {
+    fn rows(&self, group: &mut Group, track: &ArrowPath, shown: &Shown, look: &Paint) {
         let Some(place) = track.label else { return };
         let style = &self.style.edge;
         let scale = self.fit.scale;
@@ -330,7 +330,7 @@ impl GraphPen<'_> {
         is_badge: bool,
         track: &ArrowPath,
         shown: &Shown,
-        look: &ArrowLook,
+        look: &Paint,
     ) {
         let text = self.fonts.shown(text);
         let style = &self.style.edge;

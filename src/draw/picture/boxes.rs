@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::options::{self, BoxLook};
+use super::options::{self, Paint};
 use super::spaces::Space;
 use super::texts::{
     BAR, LINE, Label, ShownRates, TICK, called, class, data, fitted, item_id, rate_label,
@@ -133,7 +133,7 @@ impl GraphPen<'_> {
         item: &Item,
         body: &Body,
         place: Rect,
-        look: &BoxLook,
+        look: &Paint,
     ) -> Rect {
         let stroke = look.stroke.scaled(self.fit.pen);
         let form = self.form(item, body, place);
@@ -209,7 +209,7 @@ impl GraphPen<'_> {
         [first, second]: [&str; 2],
         place: Rect,
         body: &Body,
-        look: &BoxLook,
+        look: &Paint,
     ) {
         let scale = self.fit.scale;
         let middle = place.centre();
@@ -462,7 +462,7 @@ fn rate(shown: &Shown) -> Option<String> {
 
 impl GraphPen<'_> {
     /// The outline of a card, and its head, which is returned.
-    pub(crate) fn card(&self, group: &mut Group, card: &Card, place: Rect, look: &BoxLook) -> Rect {
+    pub(crate) fn card(&self, group: &mut Group, card: &Card, place: Rect, look: &Paint) -> Rect {
         let (scale, stroke) = (self.fit.scale, look.stroke.scaled(self.fit.pen));
         let radius = self.card_radius();
         let (form, fill) = (Form::Rect(place, radius), self.style.page.background);

@@ -99,24 +99,6 @@ impl Gate {
         self.members.iter().map(|(at, _)| *at)
     }
 
-    /// The windows in which one of the lines changes its look.
-    pub(crate) fn turns(&self, view: &View) -> BTreeSet<u32> {
-        let shown = self.members.iter();
-        let shown = shown.filter_map(|(at, _)| view.arrows_shown.get(*at));
-        shown.flat_map(ShownRuns::runs).map(|run| run.0).collect()
-    }
-
-    /// Whether each line is drawn separately in some window.
-    pub(crate) fn alone(&self, view: &View) -> impl Iterator<Item = (ArrowId, bool)> {
-        let changed = |at: ArrowId| {
-            let shown = view.arrows_shown.get(at);
-            shown.is_some_and(|shown| !shown.distinct().iter().all(is_quiet))
-        };
-        let is_lead_changed = changed(self.lead);
-        let all = self.members.iter();
-        all.map(move |(at, _)| (*at, is_lead_changed || changed(*at)))
-    }
-
     /// The look of the line for all lines that are unchanged in a window, and these lines; `None` if there
     /// are none, or if the leading line has changed.
     pub(crate) fn shown<'a>(
@@ -204,11 +186,14 @@ pub(crate) fn share(
     forks: &ById<ArrowId, Option<usize>>,
 ) {
     for (gate, names) in gates {
-        for (at, is_alone) in gate.alone(view) {
-            rooms[at] = rooms[at].filter(|_| is_alone);
+        // Lines that are drawn separately in some window keep their own.
+        let is_changed = |at: ArrowId| !view.arrows_shown[at].distinct().iter().all(is_quiet);
+        let is_lead_changed = is_changed(gate.lead);
+        for at in gate.lines() {
+            rooms[at] = rooms[at].filter(|_| is_lead_changed || is_changed(at));
         }
         let look = |at: ArrowId, window: u32| view.arrows_shown[at].at(window as usize);
-        for window in gate.turns(view) {
+        for window in ShownRuns::turns(gate.lines().map(|at| &view.arrows_shown[at])) {
             let shown = gate.shown(view, |at| look(at, window));
             let rows = shown.map(|(shown, _)| texts::rows(&shown, names));
             let room = rows.and_then(|rows| texts::room(&rows, fonts, style));

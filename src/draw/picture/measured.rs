@@ -17,9 +17,7 @@ use crate::draw::style::{Body, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::graph::{ById, Id as _};
 use crate::layout::{self, Link, Outline, Plan, Vertex};
-use crate::view::{
-    Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Shown, ShownRuns, View, both,
-};
+use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Shown, ShownRuns, View};
 
 /// The largest width of a name in pixels, and in heights of its letters if these are large; longer ones are shortened in
 /// their middle. About 30 letters: of a wider box, a layer of the graph would be mostly space.
@@ -32,13 +30,10 @@ const MOST_OTHERS: usize = 5;
 const FLAT: f64 = 0.7;
 
 /// The labels of a view, and the plan that follows from them.
-#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct MeasuredGraph {
     pub(crate) plan: Plan,
     pub(crate) labels: Vec<Label>,
     pub(crate) spaces: Vec<Space>,
-    /// Whether each arrow carries its rate.
-    pub(crate) rated: Vec<bool>,
     /// The names of the topics of each bundle as drawn; none for other arrows.
     pub(crate) topics: Vec<Vec<String>>,
     /// The lines of namespaces that are drawn as one, with the names of their topics.
@@ -139,12 +134,10 @@ impl MeasuredGraph {
                 is_direct && room.is_some()
             }),
         };
-        let rated = rooms.iter().map(Option::is_some).collect();
         Self {
             plan,
             labels,
             spaces,
-            rated,
             topics,
             gates,
             cards,
@@ -306,11 +299,10 @@ impl Measurer<'_> {
             // A subscription shows its rate if its topic has another.
             let topic = self.view.items_shown.get(arrow.from);
             let topic = topic.filter(|_| is_reported && arrow.kind == ArrowKind::Subscribe);
-            let looks = both(
-                if is_reported { looks } else { &nothing },
-                topic.unwrap_or(&nothing),
-            );
-            for (shown, topic) in looks {
+            let looks = if is_reported { looks } else { &nothing };
+            let both = [looks, topic.unwrap_or(&nothing)];
+            for window in ShownRuns::turns(both.into_iter()) {
+                let [shown, topic] = both.map(|looks| looks.at(window as usize));
                 let label = shown.and_then(|shown| arrow_label(arrow, shown, topic));
                 let Some((text, is_badge)) = label else {
                     continue;

@@ -13,7 +13,6 @@ use crate::draw::text::{Fonts, Weight};
 use crate::view::{AlsoHere, Item, Mark, MemberState, Namespace, Shown, View};
 
 /// A namespace with a box around its members.
-#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Space {
     /// Its full name.
     pub(crate) name: String,
@@ -141,7 +140,6 @@ const FIRST: &str = "also here:";
 pub(crate) const MOST_LISTED: usize = 60;
 
 /// The words for the nodes of one namespace.
-#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Footer {
     /// The namespace: an index into the view's; `None` for the words outside of all.
     pub(crate) cluster: Option<usize>,
