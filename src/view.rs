@@ -444,12 +444,8 @@ impl View {
         // The increase since the previous window.
         let mut more = vec![0_i64; self.frames.len()];
         let rows = self.rows.iter().map(|row| &row.shown);
-        for looks in self
-            .items_shown
-            .iter()
-            .chain(&self.arrows_shown)
-            .chain(rows)
-        {
+        let all = self.items_shown.iter().chain(&self.arrows_shown);
+        for looks in all.chain(rows) {
             let mut was = false;
             for (window, shown) in looks.runs() {
                 let is = shown.is_some_and(is_there);

@@ -359,13 +359,10 @@ pub(crate) fn holders(sheet: &FigureSheet<'_>) -> Result<Scene> {
     let end = drawer.ground(&mut canvas);
     let mut first = 0;
     for (topic, lanes) in &topics {
-        let all = lanes
-            .iter()
-            .flatten()
-            .flat_map(|holder| holder.times.iter().copied());
+        let all = lanes.iter().flatten().flat_map(|holder| &holder.times);
         canvas.begin("nobody");
         let (top, bottom) = (drawer.y(first), drawer.y(first + lanes.len() - 1));
-        for gap in gaps(source.span(), Span::joined(all.collect(), 0)) {
+        for gap in gaps(source.span(), Span::joined(all.copied().collect(), 0)) {
             let lane = drawer.pitch * BAR;
             canvas.hatch(drawer.axis.rect(gap, top - lane / 2.0, bottom - top + lane));
         }
@@ -426,19 +423,14 @@ impl Lane<'_> {
                 continue;
             };
             let (place, wide) = (bar(longest), canvas.width(name, Type::Small) + 2.0 * AROUND);
-            let ends = [
-                k.checked_sub(1)
-                    .map_or(axis.left, |before| axis.x(holders[before].end())),
-                holders
-                    .get(k + 1)
-                    .map_or(axis.right, |next| axis.x(next.start())),
-            ];
+            let before = k.checked_sub(1).map(|before| axis.x(holders[before].end()));
+            let next = holders.get(k + 1).map(|next| axis.x(next.start()));
             let own = [axis.x(holder.start()), axis.x(holder.end())];
             if wide <= place.w {
                 self.name(canvas, place.centre().x - wide / 2.0, true, name);
-            } else if own[1] + wide <= ends[1] {
+            } else if own[1] + wide <= next.unwrap_or(axis.right) {
                 self.name(canvas, own[1], false, name);
-            } else if own[0] - wide >= ends[0] {
+            } else if own[0] - wide >= before.unwrap_or(axis.left) {
                 self.name(canvas, own[0] - wide, false, name);
             } else {
                 let cut = canvas.cut(name, Type::Small, place.w - 2.0 * AROUND);

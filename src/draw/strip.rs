@@ -309,10 +309,12 @@ impl Choice {
             ("changes", ..) => Ok(Self::Changes),
             (_, Some(grid), _) => Ok(grid),
             (_, _, Some(windows)) => Ok(Self::Windows(windows)),
-            _ => Err(Error::usage(
-                format!("`{text}` is not a choice of windows"),
-                "give `--strip` columns and rows (`3x2`), `changes`, or windows (`0,4,9`)",
-            )),
+            _ => {
+                let what = format!("`{text}` is not a choice of windows");
+                let hint =
+                    "give `--strip` columns and rows (`3x2`), `changes`, or windows (`0,4,9`)";
+                Err(Error::usage(what, hint))
+            }
         }
     }
 

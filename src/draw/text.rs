@@ -48,26 +48,21 @@ impl Face {
     /// The font of these bytes; `None` if they are not a font, or one without characters.
     fn read(data: Cow<'static, [u8]>) -> Option<Self> {
         let font = FontRef::from_index(&data, 0).ok()?;
-        let em = font
-            .metrics(Size::unscaled(), LocationRef::default())
-            .units_per_em;
+        let metrics = font.metrics(Size::unscaled(), LocationRef::default());
+        let em = f32::from(metrics.units_per_em.max(1));
         let widths = font.glyph_metrics(Size::unscaled(), LocationRef::default());
-        let mut advances: Vec<(u32, f32)> = font
-            .charmap()
-            .mappings()
-            .filter_map(|(c, glyph)| Some((c, widths.advance_width(glyph)? / f32::from(em.max(1)))))
-            .collect();
+        let glyphs = font.charmap().mappings();
+        let advances = glyphs.filter_map(|(c, glyph)| Some((c, widths.advance_width(glyph)? / em)));
+        let mut advances: Vec<(u32, f32)> = advances.collect();
         advances.sort_by_key(|(c, _)| *c);
         advances.dedup_by_key(|(c, _)| *c);
         (!advances.is_empty()).then_some(Self { data, advances })
     }
 
     fn advance(&self, c: char) -> Option<f32> {
-        let at = self
-            .advances
-            .binary_search_by_key(&u32::from(c), |(c, _)| *c)
-            .ok()?;
-        Some(self.advances[at].1)
+        let all = &self.advances;
+        let at = all.binary_search_by_key(&u32::from(c), |(c, _)| *c);
+        Some(all[at.ok()?].1)
     }
 }
 
@@ -147,11 +142,8 @@ impl Fonts {
     /// The width of `text` in pixels at a font size of `size` pixels; exact for the bundled font, which has no kerning.
     /// A character that no font has counts as one em.
     pub fn width(&self, text: &str, size: f64, weight: Weight) -> f64 {
-        let em: f64 = text
-            .chars()
-            .map(|c| f64::from(self.advance(c, weight).unwrap_or(1.0)))
-            .sum();
-        em * size
+        let advance = |c| f64::from(self.advance(c, weight).unwrap_or(1.0));
+        text.chars().map(advance).sum::<f64>() * size
     }
 
     /// `text` in drawable form: control characters, invisible and direction marks, and characters that no

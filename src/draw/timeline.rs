@@ -180,11 +180,8 @@ impl<'a> FigureSource<'a> {
 
     /// The strongest confidence to which an element is known.
     pub(crate) fn confidence(&self, what: Element) -> Confidence {
-        let rows = self
-            .mission
-            .graphs
-            .rows(what)
-            .map(|(_, row)| row.confidence);
-        rows.min().unwrap_or(Confidence::Declared)
+        let rows = self.mission.graphs.rows(what);
+        let confidences = rows.map(|(_, row)| row.confidence);
+        confidences.min().unwrap_or(Confidence::Declared)
     }
 }

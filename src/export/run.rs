@@ -209,9 +209,8 @@ pub(crate) fn fit(
         smaller.options = options;
         let outcome = pass(&smaller, std::slice::from_ref(output), progress)?;
         if let Some(Some(mut written)) = outcome.into_iter().next() {
-            written
-                .remarks
-                .push(given_up(&sequence.options, &smaller.options));
+            let remark = given_up(&sequence.options, &smaller.options);
+            written.remarks.push(remark);
             return Ok(written);
         }
     }
@@ -228,10 +227,10 @@ fn steps(asked: &SequenceOptions) -> Vec<SequenceOptions> {
         ..asked.clone()
     };
     let mut steps = SCALES.map(scaled).to_vec();
-    let smallest = scaled(SCALES[SCALES.len() - 1]);
+    let smallest = || scaled(SCALES[SCALES.len() - 1]);
     steps.extend(EVERY.map(|every| SequenceOptions {
         every,
-        ..smallest.clone()
+        ..smallest()
     }));
     steps.extend(LAST_SCALES.map(|by| SequenceOptions {
         changes_only: true,
@@ -243,18 +242,15 @@ fn steps(asked: &SequenceOptions) -> Vec<SequenceOptions> {
 /// What was dropped between `asked` and `now`, as text.
 fn given_up(asked: &SequenceOptions, now: &SequenceOptions) -> String {
     let mut words = Vec::new();
+    let (percent, every) = (now.scale / asked.scale * 100.0, now.every);
     if now.scale < asked.scale {
-        words.push(format!(
-            "scaled to {:.0} %",
-            now.scale / asked.scale * 100.0
-        ));
+        words.push(format!("scaled to {percent:.0} %"));
     }
     if now.changes_only {
         words.push("showed only the windows with a change".to_owned());
-    } else if now.every > asked.every {
+    } else if every > asked.every {
         words.push(format!(
-            "showed one of every {} windows, and all with a change",
-            now.every
+            "showed one of every {every} windows, and all with a change"
         ));
     }
     let most = now.max_bytes.unwrap_or(0);
@@ -394,10 +390,8 @@ impl<'a> RasterPool<'a> {
 
     /// A palette from a few frames.
     fn survey(&self) -> Result<Palette> {
-        let is_changed = |at: &usize| {
-            let window = self.frame_times[*at].window;
-            self.sequence.view.is_changed(window)
-        };
+        let view = self.sequence.view;
+        let is_changed = |at: &usize| view.is_changed(self.frame_times[*at].window);
         let all: Vec<usize> = (0..self.frame_times.len()).collect();
         let changed: Vec<usize> = all.iter().copied().filter(is_changed).collect();
         let mut sample: Vec<usize> = spread(&changed, SAMPLES / 2).collect();
@@ -409,8 +403,7 @@ impl<'a> RasterPool<'a> {
             let mut canvas = Canvas::new(self.sequence.painter, self.sequence.options.scale);
             let mut census = Census::default();
             for at in places {
-                let scene = self.scene(self.frame_times[*at]);
-                let drawn = canvas.draw(scene)?;
+                let drawn = canvas.draw(self.scene(self.frame_times[*at]))?;
                 census.count(&drawn.pixels.rgba);
             }
             Ok(census)
@@ -472,9 +465,8 @@ impl<'a> Drawer<'a> {
             self.indices.clone_from(&self.before);
             self.indices.resize(pixels.rgba.len() / 4, 0);
             for bytes in drawn.changed() {
-                let places = bytes.start / 4..bytes.end / 4;
-                self.matcher
-                    .map(&pixels.rgba[bytes], &mut self.indices[places]);
+                let places = &mut self.indices[bytes.start / 4..bytes.end / 4];
+                self.matcher.map(&pixels.rgba[bytes], places);
             }
         }
         self.at = Some(at);

@@ -47,12 +47,12 @@ pub(crate) fn start<'a>(
     };
     match sequence.shows(target, whole) {
         Shows::Film if kind == StillKind::Svg => animation(sequence, target),
-        Shows::Whole(scene) => Ok(one_drawing(target, move || match kind {
-            StillKind::Svg => Ok(svg::write(scene).into_bytes()),
-            _ => encoded(
-                kind,
-                &sequence.painter.paint(scene, sequence.options.scale)?,
-            ),
+        Shows::Whole(scene) => Ok(one_drawing(target, move || {
+            if kind == StillKind::Svg {
+                return Ok(svg::write(scene).into_bytes());
+            }
+            let scale = sequence.options.scale;
+            encoded(kind, &sequence.painter.paint(scene, scale)?)
         })),
         Shows::Film | Shows::Windows => Ok(Box::new(Images {
             kind,

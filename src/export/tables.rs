@@ -35,8 +35,9 @@ pub(crate) fn check(target: &Target) -> Result<()> {
         Target::Path(path) if is_special(path) => format!("`{}` is one", path.display()),
         Target::Path(_) => return target.must_be_one("the tables contain all windows"),
     };
+    let what = format!("the tables are several files, {what}");
     Err(Error::usage(
-        format!("the tables are several files, {what}"),
+        what,
         "give a file: `-o x.csv` writes `x.edges.csv` and others",
     ))
 }
@@ -429,18 +430,15 @@ impl Folder {
     /// # Errors
     /// Where the system refuses.
     pub(crate) fn create(path: &Path) -> Result<Self> {
-        let missing = path
-            .ancestors()
-            .take_while(|f| !f.as_os_str().is_empty() && !f.exists());
+        let missing = path.ancestors();
+        let missing = missing.take_while(|f| !f.as_os_str().is_empty() && !f.exists());
         let mut missing: Vec<PathBuf> = missing.map(Path::to_owned).collect();
         missing.reverse();
         fs::create_dir_all(path).map_err(Error::io("create the folder", path))?;
         let mut builder = tempfile::Builder::new();
-        let hidden = builder
-            .prefix(".bagreel-")
-            .suffix(".part")
-            .tempdir_in(path)
-            .map_err(Error::io("write into", path))?;
+        builder.prefix(".bagreel-").suffix(".part");
+        let hidden = builder.tempdir_in(path);
+        let hidden = hidden.map_err(Error::io("write into", path))?;
         Ok(Self {
             path: path.to_owned(),
             _left: Leftover::at(hidden.path()),
@@ -535,10 +533,9 @@ impl TableFormat {
     /// [`Error::Usage`] if not, with the builds that do.
     pub(crate) fn built(self) -> Result<Self> {
         if self == Self::Parquet && cfg!(not(feature = "parquet")) {
-            return Err(Error::usage(
-                NO_PARQUET,
-                "packages and the Python wheel do, and `cargo install --path . --features parquet`",
-            ));
+            let hint =
+                "packages and the Python wheel do, and `cargo install --path . --features parquet`";
+            return Err(Error::usage(NO_PARQUET, hint));
         }
         Ok(self)
     }

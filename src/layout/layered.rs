@@ -413,10 +413,8 @@ impl PlacedPart {
     pub(crate) fn on_page(self, orientation: Orientation) -> Self {
         let reach = Rect::of_points(self.routes.iter().flat_map(Route::points));
         let rects = self.boxes.iter().chain(&self.clusters).copied();
-        let whole = rects
-            .chain(reach)
-            .reduce(|a, b| a.union(&b))
-            .unwrap_or_default();
+        let whole = rects.chain(reach).reduce(|a, b| a.union(&b));
+        let whole = whole.unwrap_or_default();
         let to_page = |p: Point| match orientation {
             Orientation::LeftRight => Point::new(p.x - whole.x, p.y - whole.y),
             Orientation::TopBottom => Point::new(p.y - whole.y, p.x - whole.x),
@@ -430,11 +428,7 @@ impl PlacedPart {
             size: turned(Size::new(whole.w, whole.h), orientation),
             crossings: self.crossings,
             boxes: self.boxes.iter().map(rect).collect(),
-            routes: self
-                .routes
-                .iter()
-                .map(|route| route.mapped(to_page))
-                .collect(),
+            routes: self.routes.iter().map(|r| r.mapped(to_page)).collect(),
             clusters: self.clusters.iter().map(rect).collect(),
         }
     }

@@ -67,17 +67,14 @@ pub(crate) fn common(parent: &[usize], mut a: usize, mut b: usize) -> usize {
 
 /// The number of items that the layers would have.
 pub(crate) fn items(part: &Component, rank: &[usize]) -> usize {
-    let bends = part
+    let long = part
         .ends
         .iter()
-        .map(|&(from, to)| rank[from].abs_diff(rank[to]).saturating_sub(1))
-        .sum::<usize>();
-    let borders = spans(part, rank)
-        .iter()
-        .skip(1)
-        .map(|(low, high)| 2 * (high - low + 1))
-        .sum::<usize>();
-    part.vertices.len() + bends + borders
+        .map(|&(from, to)| rank[from].abs_diff(rank[to]));
+    let bends = long.map(|ranks| ranks.saturating_sub(1));
+    let spans = spans(part, rank).into_iter().skip(1);
+    let borders = spans.map(|(low, high)| 2 * (high - low + 1));
+    part.vertices.len() + bends.chain(borders).sum::<usize>()
 }
 
 /// The first and last rank in each cluster.

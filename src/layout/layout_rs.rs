@@ -114,17 +114,12 @@ fn block(task: PartTask<'_>) -> Option<PlacedPart> {
     let room = Spacing::new(task, &layers);
     let places = places(&layers, &rows, &room, task.orientation);
     let across: Vec<f64> = places.iter().map(|&(_, across)| across).collect();
-    let columns: Vec<(f64, f64)> = rows
-        .iter()
-        .map(|row| column(row, &layers, &room, &places))
-        .collect();
+    let columns = rows.iter().map(|row| column(row, &layers, &room, &places));
+    let columns: Vec<(f64, f64)> = columns.collect();
     let part = routed(task, &room, &across, &columns);
     let is_clear = |(v, own): (usize, &Rect)| part.boxes[..v].iter().all(|b| !b.overlaps(own));
-    part.boxes
-        .iter()
-        .enumerate()
-        .all(is_clear)
-        .then(|| PlacedPart { crossings, ..part }.on_page(task.orientation))
+    let are_clear = part.boxes.iter().enumerate().all(is_clear);
+    are_clear.then(|| PlacedPart { crossings, ..part }.on_page(task.orientation))
 }
 
 /// The middle of each item: along, across.
@@ -163,10 +158,10 @@ fn places(
             graph.dag.add_edge(item.into(), next.into());
         }
     }
-    *graph.dag.ranks_mut() = rows
+    let ranks = rows
         .iter()
-        .map(|row| row.iter().map(|&item| item.into()).collect())
-        .collect();
+        .map(|row| row.iter().map(|&item| item.into()).collect());
+    *graph.dag.ranks_mut() = ranks.collect();
     Placer::new(&mut graph).layout(false);
     let middle = |item: usize| {
         let at = graph.pos(item.into()).center();

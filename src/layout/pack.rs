@@ -125,10 +125,8 @@ pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
             corners[member] = Point::new(corners[member].x + x, corners[member].y + y);
         }
     }
-    let rects = corners
-        .iter()
-        .zip(&sizes)
-        .map(|(at, size)| Rect::new(at.x, at.y, size.w, size.h));
+    let rects = corners.iter().zip(&sizes);
+    let rects = rects.map(|(at, size)| Rect::new(at.x, at.y, size.w, size.h));
     let mut boxes: Vec<Rect> = rects.collect();
     let clusters = boxes.split_off(n);
     let (routes, _) = around::routes(plan, &boxes);

@@ -39,10 +39,8 @@ pub(crate) fn kept(plan: &Plan, known: &[Option<Rect>], orientation: Orientation
     let clusters = table.frames();
     let boxes = table.boxes.into_iter();
     let boxes: Vec<Rect> = boxes.map(Option::unwrap_or_default).collect();
-    let whole = boxes
-        .iter()
-        .chain(&clusters)
-        .fold(Rect::default(), |all, rect| all.union(rect));
+    let all = boxes.iter().chain(&clusters);
+    let whole = all.fold(Rect::default(), |all, rect| all.union(rect));
     Layout {
         orientation,
         size: Size::new(whole.right(), whole.bottom()),
@@ -165,10 +163,9 @@ impl PinnedBoxes<'_> {
 
 /// The steps on the border of a square, nearest to its axes first.
 fn around(ring: i32) -> Vec<(i32, i32)> {
-    let mut steps: Vec<(i32, i32)> = (-ring..=ring)
-        .flat_map(|x| (-ring..=ring).map(move |y| (x, y)))
-        .filter(|(x, y)| x.abs().max(y.abs()) == ring)
-        .collect();
+    let square = (-ring..=ring).flat_map(|x| (-ring..=ring).map(move |y| (x, y)));
+    let border = square.filter(|(x, y)| x.abs().max(y.abs()) == ring);
+    let mut steps: Vec<(i32, i32)> = border.collect();
     steps.sort_by_key(|(x, y)| (x.abs() + y.abs(), -x, -y));
     steps
 }

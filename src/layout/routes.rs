@@ -163,11 +163,8 @@ impl RoutePen {
         if self.is_level {
             self.route.curves.pop();
         }
-        let from = self
-            .route
-            .curves
-            .last()
-            .map_or(self.route.start, |curve| curve[2]);
+        let last = self.route.curves.last();
+        let from = last.map_or(self.route.start, |curve| curve[2]);
         let to = Point::new(x, self.at.y);
         let third = (to.x - from.x) / 3.0;
         self.route.curves.push([

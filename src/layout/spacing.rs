@@ -137,10 +137,10 @@ impl<'a> Spacing<'a> {
         let distance = |pair: &[usize]| {
             self.reach(pair[0], true) + self.reach(pair[1], false) + self.gap(pair[0], pair[1])
         };
-        let mut apart: Vec<Vec<f64>> = rows
+        let apart = rows
             .iter()
-            .map(|row| row.windows(2).map(distance).collect())
-            .collect();
+            .map(|row| row.windows(2).map(distance).collect());
+        let mut apart: Vec<Vec<f64>> = apart.collect();
         for cluster in (1..self.layers.parent.len()).rev() {
             let rank = self.layers.span[cluster].0;
             self.widen_for_title(cluster, &rows[rank], &mut apart[rank]);

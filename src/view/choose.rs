@@ -83,10 +83,8 @@ pub(crate) fn finish(
     let wiring = elements.wiring(|_, _| true);
     let hides_debug = options.hide.debug && !options.mode.is_direct();
     for (id, topic) in elements.topics.with_ids().filter(|(id, _)| !grouped[*id]) {
-        let mut ends = wiring.publishers[id]
-            .iter()
-            .chain(&wiring.subscribers[id])
-            .peekable();
+        let (from, to) = (&wiring.publishers[id], &wiring.subscribers[id]);
+        let mut ends = from.iter().chain(to).peekable();
         let is_outside = |node: &NodeId| selection.nodes[*node] == Some(Reason::NsFilter);
         let reason = &mut selection.topics[id];
         if ends.peek().is_some() && ends.all(is_outside) {

@@ -274,17 +274,16 @@ fn presence(item: &Item, mission: &Mission, marks: &NodeMarks) -> Presence {
     let nodes = || item.members.iter().filter(|what| what.is_node());
     let lives = nodes().flat_map(|what| mission.elements.seen(*what).lives.iter().copied());
     let times = Span::joined(lives.collect(), 0);
-    let part = |at| mission.span.part(at);
-    let mut own: Vec<_> = nodes()
-        .filter_map(|what| marks.get(what))
-        .flatten()
-        .collect();
+    let parts = |life: &Span| {
+        [life.start, life.end]
+            .map(|at| mission.span.part(at))
+            .into()
+    };
+    let own = nodes().filter_map(|what| marks.get(what));
+    let mut own: Vec<_> = own.flatten().collect();
     own.sort_by_key(|(id, ..)| *id);
     Presence {
-        times: times
-            .iter()
-            .map(|life| (part(life.start), part(life.end)))
-            .collect(),
+        times: times.iter().map(parts).collect(),
         marks: own.into_iter().map(|(_, at, mark)| (*at, *mark)).collect(),
     }
 }

@@ -377,10 +377,8 @@ impl Tip {
         // Back along the line, and to its left.
         let at = |back: f64, left: f64| {
             let (back, left) = (back * length, left * length);
-            Point::new(
-                tip.x - along.x * back - along.y * left,
-                tip.y - along.y * back + along.x * left,
-            )
+            let x = tip.x - along.x * back - along.y * left;
+            Point::new(x, tip.y - along.y * back + along.x * left)
         };
         match self {
             Self::Arrow => polygon(&[tip, at(1.0, 0.38), at(1.0, -0.38)]),

@@ -172,10 +172,8 @@ impl<'a> Spotlight<'a> {
         let changed = seen.items.iter().filter(|shown| is_news(shown));
         let is_new = |looks: &ShownRuns| looks.at(k).is_some_and(is_news);
         let rows = view.rows.iter().filter(|row| is_new(&row.shown));
-        let news: BTreeSet<ItemId> = changed
-            .map(Shown::item)
-            .chain(rows.map(|r| r.owner))
-            .collect();
+        let rows = rows.map(|row| row.owner);
+        let news: BTreeSet<ItemId> = changed.map(Shown::item).chain(rows).collect();
         let mut spot = Self {
             style: measured.style,
             lit: news.clone(),

@@ -473,12 +473,9 @@ pub(crate) fn names(view: &View, arrow: &Arrow) -> Vec<String> {
         rest.unwrap_or(name).to_owned()
     };
     let plain: Vec<String> = arrow.topics.iter().map(plain).collect();
-    let forms: Vec<[&str; 3]> = arrow
-        .topics
-        .iter()
-        .zip(&plain)
-        .map(|(whole, plain)| [last(plain), relative(view, arrow, plain), whole])
-        .collect();
+    let forms = arrow.topics.iter().zip(&plain);
+    let forms = forms.map(|(whole, plain)| [last(plain), relative(view, arrow, plain), &**whole]);
+    let forms: Vec<[&str; 3]> = forms.collect();
     let is_alone = |at: usize, form: usize| {
         let same = forms.iter().filter(|other| other[form] == forms[at][form]);
         same.count() == 1
@@ -526,30 +523,19 @@ pub(crate) fn rows(shown: &Shown, names: &[String]) -> Vec<Row> {
     let is_whole = shown.is_ghost();
     let mut rows: Vec<Row> = Vec::new();
     for row in shown.by_rate().take(most) {
-        let name = names.get(row.topic as usize).map_or("", String::as_str);
-        let name = &*if row.is_service {
-            called(name)
-        } else {
-            name.to_owned()
-        };
+        let mut name = names.get(row.topic as usize).cloned().unwrap_or_default();
+        if row.is_service {
+            name = called(&name);
+        }
         let rate = rate_of_topic(row).filter(|_| !is_whole && row.mark != Some(Mark::Removed));
-        let is_split = rate
-            .as_ref()
-            .is_some_and(|rate| name.len() + rate.len() >= LONGEST);
-        let (text, below) = match rate {
-            None => (name.to_owned(), None),
-            Some(rate) if is_split => (name.to_owned(), Some(rate)),
-            Some(rate) => (format!("{name} {rate}"), None),
+        let lines = match rate {
+            None => vec![name],
+            Some(rate) if name.len() + rate.len() >= LONGEST => vec![name, rate],
+            Some(rate) => vec![format!("{name} {rate}")],
         };
         let has_signs = both || row.ways == [true, true];
-        let ways = if has_signs { row.ways } else { [false; 2] };
-        rows.push(Row {
-            ways,
-            text,
-            mark: row.mark,
-        });
-        rows.extend(below.map(|text| Row {
-            ways: [false, false],
+        rows.extend(lines.into_iter().enumerate().map(|(line, text)| Row {
+            ways: row.ways.map(|way| way && has_signs && line == 0),
             text,
             mark: row.mark,
         }));

@@ -225,10 +225,9 @@ impl<'a> Title<'a> {
         }
         let below = self.cut(&parts.join(NOTES), small, Weight::Regular, most);
         let all = self.page.title.w - 2.0 * self.left() - GAP * unit;
-        let room = (
-            (all - self.width(&time, size, Weight::SemiBold)).max(1.0),
-            (all - self.width(&below, small, Weight::Regular)).max(1.0),
-        );
+        let first = self.width(&time, size, Weight::SemiBold);
+        let second = self.width(&below, small, Weight::Regular);
+        let room = ((all - first).max(1.0), (all - second).max(1.0));
         let right = |text: Text| Text {
             at: Point::new(self.page.title.right() - self.left(), text.at.y),
             anchor: Anchor::End,

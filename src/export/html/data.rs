@@ -152,9 +152,8 @@ fn graph<'a>(
     let order = || drawn.order.iter().map(|id| &view.arrows[*id]);
     let of_items = view.items.iter().map(|i| (&i.members, true));
     let of_arrows = order().map(|a| (&a.members, false));
-    let facts = of_items
-        .chain(of_arrows)
-        .map(|(members, is_item)| facts_of(page, members, clock, is_item, words));
+    let all = of_items.chain(of_arrows);
+    let facts = all.map(|(members, is_item)| facts_of(page, members, clock, is_item, words));
     let members = |item: &Item| -> Vec<u32> {
         let places = item.members.iter().filter_map(|m| places.get(m).copied());
         let places: BTreeSet<u32> = places.collect();
@@ -167,10 +166,8 @@ fn graph<'a>(
         };
         (arrow.from.0, arrow.to.0, carried)
     };
-    let names = view
-        .items
-        .iter()
-        .map(|item| visible(&item.name).into_owned());
+    let names = view.items.iter();
+    let names = names.map(|item| visible(&item.name).into_owned());
     let of_lines = drawn.order.iter().map(|id| &runs.arrows[id.at()]);
     GraphData {
         facts: facts.collect(),
@@ -205,10 +202,9 @@ fn rows(timeline: &Timeline, changes: &PageChanges) -> Vec<RowData> {
     let row = |row: &Row| {
         let place = row.what().and_then(|what| changes.places.get(&what));
         let is_inferred = f64::from(u8::from(row.is_inferred));
-        let lives = row
-            .lives
-            .iter()
-            .flat_map(|life| [clock.secs(life.start), clock.secs(life.end), is_inferred]);
+        let lives = row.lives.iter();
+        let lives =
+            lives.flat_map(|life| [clock.secs(life.start), clock.secs(life.end), is_inferred]);
         let marks = row.marks.iter().filter_map(|mark| {
             let sign = match mark.sign {
                 Sign::Start => 0,
@@ -309,9 +305,8 @@ fn facts_of(
     if let (true, [Element::Topic(_), ..]) = (is_item, members) {
         facts.extend(types(elements, members));
     }
-    let evidence = members
-        .iter()
-        .fold(Evidence::NONE, |all, m| all.and(elements.evidence(*m)));
+    let evidence = members.iter().map(|m| elements.evidence(*m));
+    let evidence = evidence.fold(Evidence::NONE, Evidence::and);
     let is_ros1 = is_ros1(page.sequence.mission).unwrap_or(false);
     facts.extend(evidence.lines().map(|line| known_by(&line, is_ros1)));
     if is_item {
@@ -336,8 +331,8 @@ fn facts_of(
             facts.push(format!("{many} together: {names}{more}"));
         }
     }
+    let facts = facts.into_iter();
     facts
-        .into_iter()
         .map(|f| words.place(visible(&f).into_owned()))
         .collect()
 }

@@ -83,12 +83,7 @@ impl<'a> Blocks<'a> {
             let (_, layout) = Draft::new(&sub.plan, &options)?.assembled(task.orientation);
             Some(Contents { sub, layout })
         };
-        let each = |space: &usize| {
-            SHAPES
-                .iter()
-                .map(|shape| laid_out(*space, *shape))
-                .collect()
-        };
+        let each = |space: &usize| SHAPES.iter().map(|s| laid_out(*space, *s)).collect();
         let contents: Option<Vec<Vec<Contents>>> = cut.spaces.par_iter().map(each).collect();
         Some(Self {
             contents: contents?,

@@ -178,12 +178,8 @@ fn depth_first(layers: &Layers, sources: bool) -> Vec<f64> {
             if met[v].is_nan() {
                 met[v] = clock;
                 clock += 1.0;
-                stack.extend(
-                    layers.down[v]
-                        .iter()
-                        .chain(&layers.up[v])
-                        .filter(|&&u| met[u].is_nan()),
-                );
+                let beside = layers.down[v].iter().chain(&layers.up[v]);
+                stack.extend(beside.filter(|&&u| met[u].is_nan()));
             }
         }
     }
@@ -652,17 +648,13 @@ fn bracketed(layers: &Layers, around: usize, items: Vec<usize>) -> Vec<usize> {
     }
     for (cluster, members) in inside {
         let border = |v: &usize, kind| layers.home[*v] == cluster && layers.kind[*v] == kind;
-        row.extend(
-            members
-                .iter()
-                .copied()
-                .filter(|v| border(v, LayerItem::Top)),
-        );
-        let (borders, rest): (Vec<usize>, _) = members
-            .into_iter()
-            .partition(|v| border(v, LayerItem::Top) || border(v, LayerItem::Bottom));
+        let is_top = |v: &usize| border(v, LayerItem::Top);
+        let is_bottom = |v: &usize| border(v, LayerItem::Bottom);
+        let (top, inside): (Vec<usize>, Vec<_>) = members.into_iter().partition(is_top);
+        let (bottom, rest): (Vec<usize>, _) = inside.into_iter().partition(is_bottom);
+        row.extend(top);
         row.extend(bracketed(layers, cluster, rest));
-        row.extend(borders.into_iter().filter(|v| border(v, LayerItem::Bottom)));
+        row.extend(bottom);
     }
     row
 }

@@ -36,29 +36,23 @@ pub(crate) fn parts(plan: &Plan) -> Vec<Component> {
         let leader = groups.leader(plan.links[i].from);
         parts.entry(leader).or_default().links.push(i);
     }
-    parts
-        .into_values()
-        .map(|part| localised(plan, part))
-        .collect()
+    let parts = parts.into_values();
+    parts.map(|part| localised(plan, part)).collect()
 }
 
 /// The part with its ends, clusters and pieces as indices within it.
 fn localised(plan: &Plan, mut part: Component) -> Component {
     let at = |v: usize| part.vertices.binary_search(&v).unwrap_or(0);
-    part.ends = part
-        .links
-        .iter()
-        .map(|&i| (at(plan.links[i].from), at(plan.links[i].to)))
-        .collect();
+    let links = part.links.iter().map(|&i| &plan.links[i]);
+    part.ends = links.map(|link| (at(link.from), at(link.to))).collect();
     part.pieces = part.pieces.iter().map(|&v| at(v)).collect();
     part.clusters = clusters_of(plan, &part.vertices);
     let number = |c: usize| part.clusters.binary_search(&c).map_or(0, |i| i + 1);
     let home = |&v: &usize| plan.vertices[v].cluster.map_or(0, number);
     let parent = |&c: &usize| plan.clusters[c].parent.map_or(0, number);
     part.home = part.vertices.iter().map(home).collect();
-    part.parent = std::iter::once(0)
-        .chain(part.clusters.iter().map(parent))
-        .collect();
+    let parents = part.clusters.iter().map(parent);
+    part.parent = std::iter::once(0).chain(parents).collect();
     part
 }
 

@@ -138,10 +138,8 @@ pub(crate) fn by_cluster(edges: &[(usize, usize)], home: &[usize], parent: &[usi
     let pairs: Vec<(usize, usize)> = order.into_iter().map(|(pair, _)| pair).collect();
     let turns = in_order(home.len() + parent.len(), &pairs);
     let turn: BTreeMap<_, _> = pairs.into_iter().zip(turns).collect();
-    sides
-        .iter()
-        .map(|pair| turn.get(pair).copied().unwrap_or(false))
-        .collect()
+    let turns = sides.iter().map(|pair| turn.get(pair).copied());
+    turns.map(Option::unwrap_or_default).collect()
 }
 
 /// The two units that an edge leaves and enters inside the innermost cluster around both of its ends: each a
@@ -160,10 +158,8 @@ fn parting((from, to): (usize, usize), home: &[usize], parent: &[usize]) -> (usi
 /// the vertex with the largest surplus of outgoing edges.
 pub(crate) fn greedy(n: usize, edges: &[(usize, usize)]) -> Vec<bool> {
     let place = greedy_order(n, edges);
-    edges
-        .iter()
-        .map(|&(from, to)| place[from] > place[to])
-        .collect()
+    let edges = edges.iter();
+    edges.map(|&(from, to)| place[from] > place[to]).collect()
 }
 
 fn greedy_order(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
@@ -308,11 +304,8 @@ impl Adjacency {
         order.sort_by_key(|&v| (rank[v], v));
         let mut depth = vec![0; n];
         for &v in order.iter().rev() {
-            depth[v] = after[v]
-                .iter()
-                .map(|&u: &usize| depth[u] + 1)
-                .max()
-                .unwrap_or(0);
+            let behind = after[v].iter().map(|&u: &usize| depth[u] + 1);
+            depth[v] = behind.max().unwrap_or(0);
         }
         Self {
             before,
@@ -335,10 +328,8 @@ impl Adjacency {
     }
 
     fn leaves(&self, source: usize) -> usize {
-        self.after[source]
-            .iter()
-            .filter(|&&v| self.is_leaf(v))
-            .count()
+        let after = self.after[source].iter();
+        after.filter(|&&v| self.is_leaf(v)).count()
     }
 }
 
