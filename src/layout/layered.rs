@@ -433,13 +433,6 @@ impl PlacedPart {
         }
     }
 
-    /// The block with the places that its labels probably take, so that they do not cover the block next to it.
-    fn with_labels(&self, task: PartTask<'_>) -> Rect {
-        let block = Rect::new(0.0, 0.0, self.size.w, self.size.h);
-        let labels = self.labels(task);
-        labels.fold(block, |all, label| all.union(&label))
-    }
-
     /// The places that labels take: where they are placed, else probably above lines to the right and beside lines down.
     fn labels<'a>(&'a self, task: PartTask<'a>) -> impl Iterator<Item = Rect> + 'a {
         let label = move |(&i, route): (&usize, &Route)| {
@@ -482,7 +475,13 @@ pub(crate) fn assembled(
     blocks: &[(PartTask<'_>, PlacedPart)],
     orientation: Orientation,
 ) -> (u64, Layout) {
-    let bounds = blocks.iter().map(|(task, block)| block.with_labels(*task));
+    // With the places that labels probably take, so that they do not cover the block next to it.
+    let bounds = blocks.iter().map(|(task, block)| {
+        let bare = Rect::new(0.0, 0.0, block.size.w, block.size.h);
+        block
+            .labels(*task)
+            .fold(bare, |all, label| all.union(&label))
+    });
     let bounds: Vec<Rect> = bounds.collect();
     let sizes: Vec<Size> = bounds.iter().map(|b| Size::new(b.w, b.h)).collect();
     let (mut corners, mut size) = pack::pack(&sizes, options.page, PART_GAP);

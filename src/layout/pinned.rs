@@ -19,7 +19,9 @@ pub(crate) fn kept(plan: &Plan, known: &[Option<Rect>], orientation: Orientation
         boxes: vec![None; plan.vertices.len()],
     };
     for (v, vertex) in plan.vertices.iter().enumerate() {
-        let old = known.get(v).copied().flatten().filter(is_sane);
+        let is_sane = |length: f64| length.is_finite() && (0.0..=1e7).contains(&length);
+        let old = known.get(v).copied().flatten();
+        let old = old.filter(|r| [r.x, r.y, r.w, r.h].into_iter().all(is_sane));
         // It may have grown for its lines.
         let size = |old: Rect| Size::new(vertex.size.w.max(old.w), vertex.size.h.max(old.h));
         let place = old.map(|old| Rect::around(old.centre(), size(old)));
@@ -49,12 +51,6 @@ pub(crate) fn kept(plan: &Plan, known: &[Option<Rect>], orientation: Orientation
         clusters,
         remarks: Vec::new(),
     }
-}
-
-fn is_sane(rect: &Rect) -> bool {
-    [rect.x, rect.y, rect.w, rect.h]
-        .iter()
-        .all(|length| length.is_finite() && (0.0..=1e7).contains(length))
 }
 
 /// The boxes placed so far.

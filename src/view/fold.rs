@@ -162,7 +162,10 @@ pub(crate) fn groups(elements: &Elements, seen: &ById<TopicId, bool>, wish: Grou
     let mut groups = Groups::new();
     if wish.actions {
         take(&mut free, &mut groups, 5, |_, name| action(name));
-        take(&mut free, &mut groups, 2, |_, name| action_of_ros2(name));
+        // `X/_action/feedback`, `X/_action/status` and the events of its hidden services.
+        let of_ros2 =
+            |name: &str| Some(name.split_once("/_action/")?.0.to_owned() + "/action_topics");
+        take(&mut free, &mut groups, 2, |_, name| of_ros2(name));
         take(&mut free, &mut groups, 2, |_, name| service_events(name));
     }
     if wish.images {
@@ -195,12 +198,6 @@ fn take<'a>(
 fn action(topic: &str) -> Option<String> {
     const SUFFIXES: [&str; 5] = ["/status", "/result", "/goal", "/cancel", "/feedback"];
     let action = SUFFIXES.iter().find_map(|end| topic.strip_suffix(end))?;
-    Some(format!("{action}/action_topics"))
-}
-
-/// The group of `X/_action/feedback`, `X/_action/status` and the events of its hidden services.
-fn action_of_ros2(topic: &str) -> Option<String> {
-    let (action, _) = topic.split_once("/_action/")?;
     Some(format!("{action}/action_topics"))
 }
 
@@ -282,7 +279,10 @@ fn runs_of_roles(elements: &Elements) -> Vec<Fold> {
 pub(crate) fn label(items: &mut [Item], elements: &Elements) {
     let mut order: Vec<(Stamp, usize, Arc<str>)> = Vec::new();
     for (at, item) in items.iter_mut().enumerate() {
-        let Some(node) = single_node(item, elements) else {
+        let (ItemKind::Node, [Element::Node(id)]) = (item.kind, &item.members[..]) else {
+            continue;
+        };
+        let Some(node) = elements.nodes.get(*id) else {
             continue;
         };
         let mark = item.name.rfind('?');
@@ -305,13 +305,6 @@ pub(crate) fn label(items: &mut [Item], elements: &Elements) {
             1 => role,
             n => format!("{role} ~{n}").into(),
         };
-    }
-}
-
-fn single_node<'a>(item: &Item, elements: &'a Elements) -> Option<&'a Node> {
-    match (item.kind, &item.members[..]) {
-        (ItemKind::Node, [Element::Node(id)]) => elements.nodes.get(*id),
-        _ => None,
     }
 }
 

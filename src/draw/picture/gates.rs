@@ -37,10 +37,14 @@ pub(crate) fn gates(view: &View) -> Vec<Gate> {
     };
     let found = grouped(view.arrows.with_ids().filter_map(crossing));
     let found = found.into_iter().filter(|(_, members)| members.len() > 1);
+    let windows = u32::try_from(view.frames.len()).unwrap_or(u32::MAX);
     let gate = |((space, _), members): (_, Vec<(ArrowId, bool)>)| {
-        let quiet = |at: ArrowId| {
-            let shown = view.arrows_shown.get(at);
-            shown.map_or(0, |shown| quiet_windows(shown, view.frames.len()))
+        // The number of windows in which it exists without a mark.
+        let quiet = |at: ArrowId| -> u32 {
+            let runs = view.arrows_shown.get(at).into_iter();
+            let runs = runs.flat_map(|shown| shown.spans(windows));
+            let quiet = runs.filter(|(.., look)| is_quiet(look));
+            quiet.map(|(from, to, ..)| to - from).sum()
         };
         let longest = members.iter().rev().max_by_key(|(at, _)| quiet(*at));
         let lead = longest.map_or(ArrowId(0), |(at, _)| *at);
@@ -59,13 +63,6 @@ pub(crate) fn gates(view: &View) -> Vec<Gate> {
         }
     };
     found.map(gate).collect()
-}
-
-/// The number of windows in which an element exists without a mark.
-fn quiet_windows(shown: &ShownRuns, windows: usize) -> u32 {
-    let runs = shown.spans(u32::try_from(windows).unwrap_or(u32::MAX));
-    let quiet = runs.filter(|(.., look)| is_quiet(look));
-    quiet.map(|(from, to, ..)| to - from).sum()
 }
 
 fn is_quiet(shown: &Shown) -> bool {

@@ -53,7 +53,11 @@ pub(crate) fn place(layers: &Layers, rows: &LayerRows, apart: &[Vec<f64>]) -> Ve
     }
     table.straighten_borders();
     table.inside_borders();
-    table.by_item()
+    let mut across = vec![0.0; table.items.len()];
+    for (&v, place) in table.items.iter().zip(&table.across) {
+        across[v] = *place;
+    }
+    across
 }
 
 /// The items of all rows, row by row, while they are being placed.
@@ -307,14 +311,6 @@ impl<'a> Table<'a> {
                 }
             }
         }
-    }
-
-    fn by_item(&self) -> Vec<f64> {
-        let mut across = vec![0.0; self.items.len()];
-        for (&v, place) in self.items.iter().zip(&self.across) {
-            across[v] = *place;
-        }
-        across
     }
 }
 
