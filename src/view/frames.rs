@@ -526,31 +526,27 @@ impl Counts {
     fn sum(all: impl Iterator<Item = (Kind, Element)>) -> Self {
         let mut counts = Self::default();
         for (kind, what) in all {
-            *counts.slot(kind, what) += 1;
+            let is_topic = what.is_topic();
+            *match kind {
+                Kind::Started => &mut counts.nodes_added,
+                Kind::Stopped => &mut counts.nodes_removed,
+                Kind::Restarted => &mut counts.restarted,
+                Kind::Silent => &mut counts.silent,
+                Kind::Appeared if is_topic => &mut counts.topics_added,
+                Kind::Appeared => &mut counts.edges_added,
+                Kind::Vanished if is_topic => &mut counts.topics_removed,
+                Kind::Vanished => &mut counts.edges_removed,
+                Kind::HandedOver => &mut counts.handed_over,
+                Kind::Rate => &mut counts.rates,
+                Kind::Lifecycle
+                | Kind::Type
+                | Kind::Qos
+                | Kind::Starved
+                | Kind::Duplicate
+                | Kind::Lost => &mut counts.values,
+            } += 1;
         }
         counts
-    }
-
-    fn slot(&mut self, kind: Kind, what: Element) -> &mut usize {
-        let is_topic = what.is_topic();
-        match kind {
-            Kind::Started => &mut self.nodes_added,
-            Kind::Stopped => &mut self.nodes_removed,
-            Kind::Restarted => &mut self.restarted,
-            Kind::Silent => &mut self.silent,
-            Kind::Appeared if is_topic => &mut self.topics_added,
-            Kind::Appeared => &mut self.edges_added,
-            Kind::Vanished if is_topic => &mut self.topics_removed,
-            Kind::Vanished => &mut self.edges_removed,
-            Kind::HandedOver => &mut self.handed_over,
-            Kind::Rate => &mut self.rates,
-            Kind::Lifecycle
-            | Kind::Type
-            | Kind::Qos
-            | Kind::Starved
-            | Kind::Duplicate
-            | Kind::Lost => &mut self.values,
-        }
     }
 
     /// The number of all headlines.

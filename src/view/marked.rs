@@ -185,18 +185,12 @@ struct Report<'a> {
 
 /// The mark for a part of an event on an element that existed before and still does.
 fn mark(event: &Event, part: Part, reach: Reach) -> Option<Mark> {
-    match (part, reach) {
-        (_, Reach::Part | Reach::Inside) | (Part::Whole, _) => {}
-        (Part::Leaves, Reach::Whole) => return Some(Mark::Removed),
-        (Part::Away, Reach::Whole) => return Some(Mark::Away),
-        (Part::Back, Reach::Whole) => return Some(Mark::Restarted),
-    }
-    match (event.kind, reach, &event.detail) {
-        (Kind::Rate, Reach::Whole | Reach::Part, Detail::Rates { from_hz, to_hz })
-            if to_hz > from_hz =>
-        {
-            Some(Mark::Faster)
-        }
+    let is_faster = matches!(event.detail, Detail::Rates { from_hz, to_hz } if to_hz > from_hz);
+    match (event.kind, reach, part) {
+        (_, Reach::Whole, Part::Leaves) => Some(Mark::Removed),
+        (_, Reach::Whole, Part::Away) => Some(Mark::Away),
+        (_, Reach::Whole, Part::Back) => Some(Mark::Restarted),
+        (Kind::Rate, Reach::Whole | Reach::Part, _) if is_faster => Some(Mark::Faster),
         (Kind::Rate, Reach::Whole | Reach::Part, _) => Some(Mark::Slower),
         (_, Reach::Part | Reach::Inside, _) => Some(Mark::Inside),
         (Kind::Restarted, ..) => Some(Mark::Restarted),

@@ -202,37 +202,32 @@ fn gather(slot: &mut Option<Shown>, shown: &Shown, length: f64, windows: u64) {
         steps: Vec::new(),
         ..row.clone()
     });
+    let shown = Shown {
+        unlined: Vec::new(),
+        topics: rows.collect(),
+        mark: None,
+        sender: None,
+        hz: shown.hz.map(|hz| hz * length),
+        steps: Vec::new(),
+        events: Vec::new(),
+        inside: None,
+        lifecycle: None,
+        count,
+        ..shown.clone()
+    };
     let Some(sum) = slot else {
-        *slot = Some(Shown {
-            unlined: Vec::new(),
-            topics: rows.collect(),
-            mark: None,
-            sender: None,
-            hz: shown.hz.map(|hz| hz * length),
-            steps: Vec::new(),
-            events: Vec::new(),
-            inside: None,
-            lifecycle: None,
-            count,
-            ..shown.clone()
-        });
+        *slot = Some(shown);
         return;
     };
-    for row in rows {
+    let states = [sum.state, shown.state];
+    sum.add(&shown);
+    sum.state = in_both(states, sum.count);
+    for row in shown.topics {
         match sum.topics.binary_search_by_key(&row.topic, |r| r.topic) {
             Err(place) => sum.topics.insert(place, row),
             Ok(place) => add_row(&mut sum.topics[place], &row),
         }
     }
-    let states = [sum.state, shown.state];
-    sum.add(&Shown {
-        hz: shown.hz.map(|hz| hz * length),
-        count,
-        is_paused: shown.is_paused,
-        is_starved: shown.is_starved,
-        ..Shown::plain(0, shown.state, shown.confidence)
-    });
-    sum.state = in_both(states, sum.count);
 }
 
 fn add_row(sum: &mut TopicRow, row: &TopicRow) {

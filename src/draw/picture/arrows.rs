@@ -1,7 +1,7 @@
 //! Publications and subscriptions: their routes, rates and signs of change.
 
 use super::options::{self, Paint};
-use super::texts::{self, LINE, arrow_label, class, reported};
+use super::texts::{self, LINE, arrow_label, class, entries};
 use super::{GraphFit, GraphPen, badge};
 use crate::base::geometry::{Point, Rect, Size, after, on_cubic, polyline};
 use crate::draw::scene::{Anchor, Font, Form, Group, Shape, Step, Stroke, Text, polygon};
@@ -195,15 +195,13 @@ impl GraphPen<'_> {
         let [from, to] = &track.ends;
         let kind = arrow.kind.word();
         let class = class(&format!("edge {}", arrow.class()), shown);
-        let data = vec![("from", from.clone()), ("to", to.clone())];
+        let is_bundle = arrow.kind == ArrowKind::Bundle;
+        let mut data = vec![("from", from.clone()), ("to", to.clone())];
+        data.extend(entries(&shown.events));
+        data.extend(is_bundle.then(|| ("topics", arrow.topics_in(shown).join(" "))));
         let mut group = Group::new(track.id.clone(), class)
-            .with(reported(data, shown))
+            .with(data)
             .titled(format!("{from} → {to}\n{kind}: {}", texts::facts(shown)));
-        if arrow.kind == ArrowKind::Bundle {
-            group
-                .data
-                .push(("topics", arrow.topics_in(shown).join(" ")));
-        }
         let mut over = Group {
             id: format!("{}..over", group.id),
             ..group.clone()
@@ -215,11 +213,14 @@ impl GraphPen<'_> {
             ArrowKind::Bundle | ArrowKind::Direct(_) if arrow.is_service => Tip::Service,
             _ => Tip::Arrow,
         };
-        if arrow.kind == ArrowKind::Bundle {
-            self.line([&mut glow, &mut group], track, &look, tip, shown.ways());
-            self.rows(&mut over, track, shown, &look);
+        let heads = if is_bundle {
+            shown.ways()
         } else {
-            self.line([&mut glow, &mut group], track, &look, tip, [true, false]);
+            [true, false]
+        };
+        self.line([&mut glow, &mut group], track, &look, tip, heads);
+        if is_bundle {
+            self.rows(&mut over, track, shown, &look);
         }
         // A rate that changed is shown even where there is no space beside the line, unless its topic shows it.
         let is_at_end = ends.into_iter().flatten().any(Shown::has_new_rate);
