@@ -36,7 +36,7 @@ pub(crate) use encoder::Pack;
 pub use encoder::Written;
 use encoder::{DATA, GRAPH, IMAGE, LOOK, PICTURE, WORDS};
 pub use encoder::{DrawnFrame, Encoder, Needs, OneDrawing, OutputFormat, Packet};
-pub(crate) use encoder::{Started, at_end, one_file, one_text, text_per_window};
+pub(crate) use encoder::{Started, one_drawing, one_file, one_text, text_per_window};
 use tables::TableFormat;
 use target::Target;
 pub(crate) use tex::needs_figure;
@@ -131,9 +131,8 @@ pub const FORMATS: &[OutputFormat] = &[
         word: "parquet",
         what: "the same tables as Apache Parquet: `x.edges.parquet` and others",
         check: Some(|target| {
-            TableFormat::Parquet
-                .built()
-                .and_then(|_| tables::check(target))
+            let built = TableFormat::Parquet.built();
+            built.and_then(|_| tables::check(target))
         }),
         start: |sequence, target| tables::start(sequence, target, TableFormat::Parquet),
         ..DATA
@@ -170,18 +169,13 @@ impl Output {
         let all = all.join(", ");
         let Some(word) = word else {
             let what = format!("`{}` has no known extension", name.display());
-            return Err(Error::usage(
-                what,
-                format!("choose one with `--format`: {all}"),
-            ));
+            let hint = format!("choose one with `--format`: {all}");
+            return Err(Error::usage(what, hint));
         };
-        match FORMATS.iter().find(|f| f.word == word) {
-            Some(format) => Ok(Self { format, target }),
-            None => Err(Error::usage(
-                format!("unknown format `{word}`"),
-                format!("formats: {all}"),
-            )),
-        }
+        let format = FORMATS.iter().find(|f| f.word == word);
+        let what = format!("unknown format `{word}`");
+        let format = format.ok_or_else(|| Error::usage(what, format!("formats: {all}")))?;
+        Ok(Self { format, target })
     }
 }
 
@@ -193,9 +187,8 @@ impl Output {
 pub(crate) fn check(outputs: &[Output], kept: &[PathBuf]) -> Result<()> {
     let targets: Vec<Target> = outputs.iter().flat_map(files).collect();
     check::check(&targets, kept)?;
-    outputs
-        .iter()
-        .try_for_each(|o| o.format.check.map_or(Ok(()), |check| check(&o.target)))
+    let mut each = outputs.iter();
+    each.try_for_each(|o| o.format.check.map_or(Ok(()), |check| check(&o.target)))
 }
 
 /// The files of an output: for most formats the one of its name.

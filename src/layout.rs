@@ -183,10 +183,8 @@ pub fn engine(word: &str) -> Result<&'static (dyn Engine + Sync)> {
     let found = ENGINES.iter().find(|(name, _)| *name == word);
     found.map(|(_, engine)| *engine).ok_or_else(|| {
         let words: Vec<&str> = ENGINES.iter().map(|(name, _)| *name).collect();
-        Error::usage(
-            format!("unknown layout `{word}`"),
-            format!("layouts: {}", words.join(", ")),
-        )
+        let hint = format!("layouts: {}", words.join(", "));
+        Error::usage(format!("unknown layout `{word}`"), hint)
     })
 }
 
@@ -227,9 +225,8 @@ pub fn extend(
     let (routes, straight) = routes::around::routes(&plan, &layout.boxes);
     layout.routes = routes;
     if straight > 0 {
-        layout.remarks.push(format!(
-            "{straight} edges found no way around the kept boxes"
-        ));
+        let remark = format!("{straight} edges found no way around the kept boxes");
+        layout.remarks.push(remark);
     }
     layered::labels::place(&plan, &mut layout);
     layout
@@ -269,9 +266,8 @@ impl Plan {
             }
         }
         for vertex in &mut self.vertices {
-            vertex.cluster = vertex
-                .cluster
-                .map(|c| stand_in.get(c).copied().unwrap_or(c));
+            let stand_in = |c| stand_in.get(c).copied().unwrap_or(c);
+            vertex.cluster = vertex.cluster.map(stand_in);
         }
     }
 
@@ -319,12 +315,9 @@ impl Cluster {
     /// Its frame around its contents, with the title at the top left.
     fn frame(&self, inside: Rect, padding: f64) -> Rect {
         let around = inside.grown(padding);
-        Rect::new(
-            around.x,
-            around.y - self.title.h,
-            around.w.max(self.words() + 2.0 * padding),
-            around.h + self.title.h + self.footer.h,
-        )
+        let width = around.w.max(self.words() + 2.0 * padding);
+        let height = around.h + self.title.h + self.footer.h;
+        Rect::new(around.x, around.y - self.title.h, width, height)
     }
 }
 
@@ -368,6 +361,11 @@ pub(crate) struct Component {
     parent: Vec<usize>,
     /// The first vertex of each vertex's connected component.
     pieces: Vec<usize>,
+}
+
+/// A cluster and those around it, the innermost first, without the outside; `parent` is the cluster around each.
+fn around(parent: &[usize], cluster: usize) -> impl Iterator<Item = usize> + '_ {
+    std::iter::successors(Some(cluster), |&c| Some(parent[c])).take_while(|&c| c != 0)
 }
 
 /// A part of a plan that is laid out in one orientation.
@@ -453,16 +451,9 @@ impl Layers {
         }
     }
 
-    /// The cluster of `item` that is a child of `around`; `None` if the item is directly in it.
-    fn child(&self, around: usize, item: usize) -> Option<usize> {
-        let mut cluster = self.home[item];
-        if cluster == around {
-            return None;
-        }
-        while self.parent[cluster] != around {
-            cluster = self.parent[cluster];
-        }
-        Some(cluster)
+    /// The cluster of `item` that is a child of `outer`; `None` if the item is directly in it.
+    fn child(&self, outer: usize, item: usize) -> Option<usize> {
+        around(&self.parent, self.home[item]).find(|&cluster| self.parent[cluster] == outer)
     }
 }
 
@@ -479,6 +470,16 @@ pub struct Route {
 }
 
 impl Route {
+    /// A route without a label.
+    fn new(start: Point, curves: Vec<[Point; 3]>) -> Self {
+        let label = None;
+        Self {
+            start,
+            curves,
+            label,
+        }
+    }
+
     /// All its points and controls, from its start on.
     pub(crate) fn points(&self) -> impl DoubleEndedIterator<Item = Point> {
         std::iter::once(self.start).chain(self.curves.iter().flatten().copied())

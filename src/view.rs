@@ -38,7 +38,7 @@ pub(crate) use omitted::{check_filters, none_pass, nothing, unmatched, unmatched
 pub use options::{Grouping, Hide, Mode, NameFilter, ViewOptions};
 use shown::sum;
 pub use shown::{Mark, Members, Shown, ShownRuns, TopicRow};
-pub(crate) use shown::{STEPS, both, decades};
+pub(crate) use shown::{STEPS, decades};
 pub use still::Presence;
 pub(crate) use still::{headline, union};
 
@@ -46,11 +46,8 @@ pub(crate) use still::{headline, union};
 pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
     let viewed = items::Viewed::new(mission, options);
     let notices = omitted::notes(&mission.elements, &viewed, options);
-    let frames = frames::frames(mission, options, &viewed);
-    let mut view = View {
-        compares: mission.log.compares,
-        ..assembled(viewed, options, frames)
-    };
+    let windows = frames::frames(mission, options, &viewed);
+    let mut view = assembled(viewed, options, windows);
     let is_still = options.is_still.unwrap_or(view.frames.len() == 1);
     if is_still && !view.compares {
         view = still::still(view, mission);
@@ -61,18 +58,15 @@ pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
 /// The boxes, arrows and namespaces of [`view`] without the windows, to try whether they fit on a page.
 pub(crate) fn outline(mission: &Mission, options: &ViewOptions) -> View {
     let viewed = items::Viewed::new(mission, options);
-    assembled(viewed, options, frames::Frames::default())
+    assembled(viewed, options, View::default())
 }
 
-fn assembled(viewed: items::Viewed<'_>, options: &ViewOptions, frames: frames::Frames) -> View {
+fn assembled(viewed: items::Viewed<'_>, options: &ViewOptions, windows: View) -> View {
     let mut view = View {
         items: viewed.items,
         arrows: viewed.arrows,
-        items_shown: frames.items,
-        arrows_shown: frames.arrows,
-        frames: frames.list,
         lists_few: options.is_bundled,
-        ..View::default()
+        ..windows
     };
     let boxes = view.items.len() - viewed.in_words;
     let words = view.items.split_off(boxes);
@@ -450,12 +444,8 @@ impl View {
         // The increase since the previous window.
         let mut more = vec![0_i64; self.frames.len()];
         let rows = self.rows.iter().map(|row| &row.shown);
-        for looks in self
-            .items_shown
-            .iter()
-            .chain(&self.arrows_shown)
-            .chain(rows)
-        {
+        let all = self.items_shown.iter().chain(&self.arrows_shown);
+        for looks in all.chain(rows) {
             let mut was = false;
             for (window, shown) in looks.runs() {
                 let is = shown.is_some_and(is_there);

@@ -22,9 +22,10 @@ use crate::base::geometry::{Point, Rect, Size};
 use crate::base::name::ShortNames;
 use crate::base::time::Span;
 use crate::base::words::{self, worded};
-use crate::graph::TopicId;
+use crate::graph::{Node, TopicId};
 use crate::mission::rates::{Holder, Rates};
 pub use tex::Latex;
+pub(crate) use tex::caption;
 
 worded! {
     /// The kind of figure.
@@ -88,33 +89,8 @@ impl Default for FigureOptions {
     }
 }
 
-/// A finished figure.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Figure {
-    /// The drawing; its size is that on paper.
-    pub scene: Scene,
-    /// A caption for `LaTeX`, escaped: what is drawn, the phases with their times, bag and length, the legend in words.
-    pub caption: String,
-    /// Remarks for the user; lower case, no period.
-    pub remarks: Vec<String>,
-}
-
 /// The largest height of a figure in millimetres: the text block of a page.
 pub(crate) const MOST_HEIGHT: f64 = 225.0;
-
-/// The figure with this drawing.
-pub(crate) fn finished(
-    source: &FigureSource<'_>,
-    options: &FigureOptions,
-    scene: Scene,
-    remarks: Vec<String>,
-) -> Figure {
-    Figure {
-        caption: tex::caption(source, options, &remarks),
-        scene,
-        remarks,
-    }
-}
 
 /// The shortest legible time axis, in millimetres: two of its labels side by side.
 const SHORTEST_AXIS: f64 = 15.0;
@@ -218,10 +194,8 @@ impl<'a> FigureSheet<'a> {
             let mut wider = (0..100).map(|mm| libm::ceil(width) + f64::from(mm));
             let enough = wider.find(|w| lives_drawer(timeline, &canvas, *w).is_some());
             let enough = enough.unwrap_or(88.0);
-            return Error::usage(
-                format!("{width} mm leave no space for the time axis beside the names"),
-                format!("use `--width {enough}mm`"),
-            );
+            let what = format!("{width} mm leave no space for the time axis beside the names");
+            return Error::usage(what, format!("use `--width {enough}mm`"));
         }
         let flag = if by_topics {
             "--topic-filter"
@@ -241,18 +215,18 @@ impl<'a> FigureSheet<'a> {
         let high = timeline.height(self.sizes, self.sizes.pitch());
         let hint = filter_that_fits(rows, self.most_rows(), flag, word);
         let rows = words::count(timeline.rows.len(), word);
-        Error::usage(
-            format!("{rows} are {high:.0} mm high; a page has {MOST_HEIGHT} mm"),
-            hint,
-        )
+        let what = format!("{rows} are {high:.0} mm high; a page has {MOST_HEIGHT} mm");
+        Error::usage(what, hint)
     }
 }
 
 /// The filter that leaves as many tracks as fit: the largest namespace that is not too large.
 fn filter_that_fits(tracks: &[Row], most: usize, flag: &str, word: &str) -> String {
     let mut spaces: BTreeMap<&str, usize> = BTreeMap::new();
-    for top in tracks.iter().filter_map(|t| top_space(&t.name)) {
-        *spaces.entry(top).or_default() += 1;
+    // The outermost namespace of a name, if it is in one.
+    let top = |row: &'_ Row| row.name.get(1..)?.find('/').map(|end| end + 1);
+    for (row, end) in tracks.iter().filter_map(|row| Some((row, top(row)?))) {
+        *spaces.entry(&row.name[..end]).or_default() += 1;
     }
     let fitting = spaces.iter().filter(|(_, many)| **many <= most);
     let best = fitting.max_by_key(|(name, many)| (**many, std::cmp::Reverse(**name)));
@@ -265,24 +239,17 @@ fn filter_that_fits(tracks: &[Row], most: usize, flag: &str, word: &str) -> Stri
     }
 }
 
-/// The outermost namespace of a name, if it is in one.
-fn top_space(name: &str) -> Option<&str> {
-    let end = name.get(1..)?.find('/')?;
-    name.get(..=end)
-}
-
 /// The error for a figure with nothing to draw: filters leave nothing, or no nodes are known.
 pub(crate) fn nothing(source: &FigureSource<'_>) -> Error {
-    if source.shown_topics().next().is_some() && source.knows_no_node() {
-        return Error::usage(
-            "no nodes were found",
-            "draw its topics with `--kind lives`; `bagreel info` explains how to record more",
-        );
+    // Whatever the filters say.
+    let is_without_nodes = source.mission.elements.nodes.iter().all(Node::is_tool);
+    if source.shown_topics().next().is_some() && is_without_nodes {
+        let hint =
+            "draw its topics with `--kind lives`; `bagreel info` explains how to record more";
+        return Error::usage("no nodes were found", hint);
     }
-    Error::usage(
-        "nothing is left to draw",
-        "widen `--ns-filter` or `--topic-filter`; `bagreel info` lists all names",
-    )
+    let hint = "widen `--ns-filter` or `--topic-filter`; `bagreel info` lists all names";
+    Error::usage("nothing is left to draw", hint)
 }
 
 pub(crate) fn fits(scene: &Scene) -> bool {
@@ -328,9 +295,7 @@ pub(crate) fn graph(sheet: &FigureSheet<'_>, picture: Scene) -> Scene {
         y = flow(&mut canvas, width, y + 0.4, &[sentence(ink::QUIET, text)]);
     }
     let mut scene = canvas.into_scene(Size::new(width, y + 0.3), sheet.title("Graph"));
-    let ground = scene.groups.drain(..).collect::<Vec<_>>();
-    scene.groups = picture.groups;
-    scene.groups.extend(ground);
+    scene.groups.splice(..0, picture.groups);
     scene
 }
 
@@ -394,13 +359,10 @@ pub(crate) fn holders(sheet: &FigureSheet<'_>) -> Result<Scene> {
     let end = drawer.ground(&mut canvas);
     let mut first = 0;
     for (topic, lanes) in &topics {
-        let all = lanes
-            .iter()
-            .flatten()
-            .flat_map(|holder| holder.times.iter().copied());
+        let all = lanes.iter().flatten().flat_map(|holder| &holder.times);
         canvas.begin("nobody");
         let (top, bottom) = (drawer.y(first), drawer.y(first + lanes.len() - 1));
-        for gap in gaps(source.span(), Span::joined(all.collect(), 0)) {
+        for gap in gaps(source.span(), Span::joined(all.copied().collect(), 0)) {
             let lane = drawer.pitch * BAR;
             canvas.hatch(drawer.axis.rect(gap, top - lane / 2.0, bottom - top + lane));
         }
@@ -461,19 +423,14 @@ impl Lane<'_> {
                 continue;
             };
             let (place, wide) = (bar(longest), canvas.width(name, Type::Small) + 2.0 * AROUND);
-            let ends = [
-                k.checked_sub(1)
-                    .map_or(axis.left, |before| axis.x(holders[before].end())),
-                holders
-                    .get(k + 1)
-                    .map_or(axis.right, |next| axis.x(next.start())),
-            ];
+            let before = k.checked_sub(1).map(|before| axis.x(holders[before].end()));
+            let next = holders.get(k + 1).map(|next| axis.x(next.start()));
             let own = [axis.x(holder.start()), axis.x(holder.end())];
             if wide <= place.w {
                 self.name(canvas, place.centre().x - wide / 2.0, true, name);
-            } else if own[1] + wide <= ends[1] {
+            } else if own[1] + wide <= next.unwrap_or(axis.right) {
                 self.name(canvas, own[1], false, name);
-            } else if own[0] - wide >= ends[0] {
+            } else if own[0] - wide >= before.unwrap_or(axis.left) {
                 self.name(canvas, own[0] - wide, false, name);
             } else {
                 let cut = canvas.cut(name, Type::Small, place.w - 2.0 * AROUND);

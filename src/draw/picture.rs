@@ -139,6 +139,12 @@ impl<'a> Measured<'a> {
         &self.graph.plan
     }
 
+    /// The legend, equal in every frame, and its place on the page.
+    pub(crate) fn legend(&self) -> (Group, Rect) {
+        let legend = legend::legend(&self.legend, self.style, &self.page);
+        (legend, self.page.legend)
+    }
+
     /// The options for the layout engine that follow from the page.
     pub fn layout_options(&self) -> layout::LayoutOptions {
         layout::LayoutOptions {
@@ -157,7 +163,8 @@ impl<'a> Measured<'a> {
     pub(crate) fn smallest_text(&self) -> f64 {
         let (style, graph) = (self.style, &self.graph);
         let mut smallest = style.topic.size.min(style.node.size);
-        if graph.rated.contains(&true) || !graph.footers.is_empty() {
+        let is_labelled = graph.plan.links.iter().any(|link| link.label.is_some());
+        if is_labelled || !graph.footers.is_empty() {
             smallest = smallest.min(style.edge.size);
         }
         if graph.labels.iter().any(|l| l.second) || !self.view.rows.is_empty() {
@@ -190,6 +197,8 @@ impl<'a> Measured<'a> {
             path.topics.clone_from(names);
             Some((gate.clone(), path))
         });
+        let sizes = below(style, &self.options, self.options.strip(view));
+        let timeline = self.options.timeline.clone();
         let mut picture = Picture {
             gates: gates.collect(),
             shifts,
@@ -197,13 +206,7 @@ impl<'a> Measured<'a> {
             tracks,
             order,
             title: Title::new(style, fonts, page, view, &self.options),
-            timeline: Below::new(
-                below(style, &self.options, self.options.strip(view)),
-                fonts,
-                page.timeline,
-                view,
-                self.options.timeline.clone(),
-            ),
+            timeline: Below::new(sizes, fonts, page.timeline, view, timeline),
             ground: Vec::new(),
             measured: self,
             layout,
@@ -299,8 +302,7 @@ impl Picture<'_> {
         if !measured.options.bare {
             groups.push(self.title.ground());
             if measured.options.has_legend {
-                let (legend, style) = (&measured.legend, measured.style);
-                groups.push(legend::legend(legend, style, &measured.page));
+                groups.push(measured.legend().0);
             }
             if measured.options.strip(measured.view) != Strip::Nothing {
                 groups.extend(self.timeline.ground());
@@ -312,11 +314,10 @@ impl Picture<'_> {
     fn decorations(&self, k: usize, frame: &Frame, groups: &mut Vec<Group>) {
         // The timeline names the phase, if there is one.
         let is_named = !self.measured.options.timeline.phases.is_empty();
-        let phase = self
-            .phase(k)
-            .filter(|_| !is_named || !self.measured.view.has_time());
+        let has_time = self.measured.view.has_time();
+        let phase = self.phase(k).filter(|_| !is_named || !has_time);
         groups.extend(self.title.words(frame, phase.unwrap_or("")));
-        if self.measured.view.has_time() {
+        if has_time {
             groups.extend(self.timeline.head(frame));
         }
     }
@@ -334,14 +335,12 @@ impl Picture<'_> {
         };
         let spaces = self.measured.graph.spaces.iter().zip(&self.layout.clusters);
         let mut titles = Vec::new();
-        let mut member_lists = frame.member_lists.iter();
+        let mut member_lists = frame.member_lists.iter().peekable();
         for (at, (space, place)) in spaces.enumerate() {
             let id = encoded(&space.name);
-            let member_list = (!space.replicas.is_empty())
-                .then(|| member_lists.next())
-                .flatten();
+            let who = member_lists.next_if(|_| !space.replicas.is_empty());
             let member_list =
-                member_list.map(|who| pen.member_list(space, *place, self.shifts[at], &id, who));
+                who.map(|who| pen.member_list(space, *place, self.shifts[at], &id, who));
             let empty = (!full[at]).then(|| {
                 if self.measured.graph.first_seen[at] > frame.index {
                     "not on yet"
@@ -402,12 +401,8 @@ impl Picture<'_> {
         for (gate, path) in &self.gates {
             if let Some((shown, lines)) = gate.shown(measured.view, look) {
                 in_gates.extend(lines);
-                drawn.push((
-                    &gate.arrow,
-                    path,
-                    Cow::Owned(shown),
-                    links[gate.lead.at()].fork,
-                ));
+                let fork = links[gate.lead.at()].fork;
+                drawn.push((&gate.arrow, path, Cow::Owned(shown), fork));
             }
         }
         for &id in self.order.iter().filter(|id| !in_gates.contains(id)) {

@@ -159,7 +159,7 @@ impl Anchor {
 }
 
 /// The size in pixels, the weight and the colour of a text.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) struct Font {
     pub(crate) size: f64,
     pub(crate) weight: Weight,

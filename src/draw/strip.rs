@@ -1,7 +1,7 @@
 //! The film strip: chosen windows side by side on one page, with one legend and the time under each.
 
 use super::picture::{Measured, PageOptions, Picture};
-use super::scene::{Anchor, Font, Form, Group, Piece, Scene, Shape, Stroke, Text};
+use super::scene::{Anchor, Font, Form, Group, Scene, Shape, Stroke, Text};
 use super::style::Style;
 use super::text::{Fonts, Weight};
 use super::timeline::canvas::PX_PER_MM;
@@ -272,17 +272,8 @@ impl<'a> StripSource<'a> {
             unit: Some(page.caption / self.style.legend.size),
             ..PageOptions::default()
         };
-        let picture = Measured::new(self.view, self.style, self.fonts, options);
-        let scene = picture.with(self.picture.layout().clone()).scene(0);
-        let Some(legend) = scene.groups.iter().find(|g| g.id == "legend") else {
-            return GAP;
-        };
-        let Some(Piece::Shape(ground)) = legend.pieces.first() else {
-            return GAP;
-        };
-        let Form::Rect(place, _) = ground.form else {
-            return GAP;
-        };
+        let measured = Measured::new(self.view, self.style, self.fonts, options);
+        let (legend, place) = measured.legend();
         groups.push(legend.placed(1.0, Point::new(0.0, y - place.y)));
         place.h + GAP
     }
@@ -318,10 +309,12 @@ impl Choice {
             ("changes", ..) => Ok(Self::Changes),
             (_, Some(grid), _) => Ok(grid),
             (_, _, Some(windows)) => Ok(Self::Windows(windows)),
-            _ => Err(Error::usage(
-                format!("`{text}` is not a choice of windows"),
-                "give `--strip` columns and rows (`3x2`), `changes`, or windows (`0,4,9`)",
-            )),
+            _ => {
+                let what = format!("`{text}` is not a choice of windows");
+                let hint =
+                    "give `--strip` columns and rows (`3x2`), `changes`, or windows (`0,4,9`)";
+                Err(Error::usage(what, hint))
+            }
         }
     }
 

@@ -48,35 +48,29 @@ impl Face {
     /// The font of these bytes; `None` if they are not a font, or one without characters.
     fn read(data: Cow<'static, [u8]>) -> Option<Self> {
         let font = FontRef::from_index(&data, 0).ok()?;
-        let em = font
-            .metrics(Size::unscaled(), LocationRef::default())
-            .units_per_em;
+        let metrics = font.metrics(Size::unscaled(), LocationRef::default());
+        let em = f32::from(metrics.units_per_em.max(1));
         let widths = font.glyph_metrics(Size::unscaled(), LocationRef::default());
-        let mut advances: Vec<(u32, f32)> = font
-            .charmap()
-            .mappings()
-            .filter_map(|(c, glyph)| Some((c, widths.advance_width(glyph)? / f32::from(em.max(1)))))
-            .collect();
+        let glyphs = font.charmap().mappings();
+        let advances = glyphs.filter_map(|(c, glyph)| Some((c, widths.advance_width(glyph)? / em)));
+        let mut advances: Vec<(u32, f32)> = advances.collect();
         advances.sort_by_key(|(c, _)| *c);
         advances.dedup_by_key(|(c, _)| *c);
         (!advances.is_empty()).then_some(Self { data, advances })
     }
 
     fn advance(&self, c: char) -> Option<f32> {
-        let at = self
-            .advances
-            .binary_search_by_key(&u32::from(c), |(c, _)| *c)
-            .ok()?;
-        Some(self.advances[at].1)
+        let all = &self.advances;
+        let at = all.binary_search_by_key(&u32::from(c), |(c, _)| *c);
+        Some(all[at.ok()?].1)
     }
 }
 
 /// The fonts with which labels are measured and drawn: the bundled one, then the user's. Cheap to clone.
 #[derive(Clone, Debug)]
 pub struct Fonts {
-    regular: Arc<Face>,
-    semibold: Arc<Face>,
-    extra: Vec<Arc<Face>>,
+    /// Regular and `SemiBold`, then the user's.
+    faces: Vec<Arc<Face>>,
 }
 
 impl Default for Fonts {
@@ -101,9 +95,7 @@ impl Fonts {
                 Arc::new(Face::read(Cow::Borrowed(data)).unwrap_or(broken))
             };
             Fonts {
-                regular: face(REGULAR),
-                semibold: face(SEMIBOLD),
-                extra: Vec::new(),
+                faces: vec![face(REGULAR), face(SEMIBOLD)],
             }
         });
         BUNDLED.clone()
@@ -119,51 +111,39 @@ impl Fonts {
             let reason = "no TrueType or OpenType font with characters";
             Error::bad_file(path, 0, reason, "give `--font` a .ttf, .otf or .ttc file")
         })?;
-        self.extra.push(Arc::new(face));
+        self.faces.push(Arc::new(face));
         Ok(self)
     }
 
     /// The bytes of the font files: Regular, `SemiBold`, then the user's.
     pub fn files(&self) -> impl Iterator<Item = &[u8]> {
-        [&self.regular, &self.semibold]
-            .into_iter()
-            .chain(&self.extra)
-            .map(|face| &*face.data)
+        self.faces.iter().map(|face| &*face.data)
+    }
+
+    /// The fonts of a weight with their indices in [`Fonts::files`], the one to use first.
+    fn of(&self, weight: Weight) -> impl Iterator<Item = (usize, &Face)> {
+        let all = self.faces.iter().enumerate();
+        let own = all.filter(move |(at, _)| *at == weight as usize || *at > 1);
+        own.map(|(at, face)| (at, &**face))
     }
 
     /// The index in [`Fonts::files`] of the font that draws `c` in this weight; that of the weight if no font
     /// has it.
     pub fn file_of(&self, c: char, weight: Weight) -> usize {
-        let (place, first) = match weight {
-            Weight::Regular => (0, &self.regular),
-            Weight::SemiBold => (1, &self.semibold),
-        };
-        if first.advance(c).is_some() {
-            return place;
-        }
-        let extra = self.extra.iter().position(|f| f.advance(c).is_some());
-        extra.map_or(place, |at| at + 2)
+        let found = self.of(weight).find(|(_, face)| face.advance(c).is_some());
+        found.map_or(weight as usize, |(at, _)| at)
     }
 
     /// The width of `c` in em; `None` if no font has it.
     fn advance(&self, c: char, weight: Weight) -> Option<f32> {
-        let first = match weight {
-            Weight::Regular => &self.regular,
-            Weight::SemiBold => &self.semibold,
-        };
-        std::iter::once(first)
-            .chain(&self.extra)
-            .find_map(|face| face.advance(c))
+        self.of(weight).find_map(|(_, face)| face.advance(c))
     }
 
     /// The width of `text` in pixels at a font size of `size` pixels; exact for the bundled font, which has no kerning.
     /// A character that no font has counts as one em.
     pub fn width(&self, text: &str, size: f64, weight: Weight) -> f64 {
-        let em: f64 = text
-            .chars()
-            .map(|c| f64::from(self.advance(c, weight).unwrap_or(1.0)))
-            .sum();
-        em * size
+        let advance = |c| f64::from(self.advance(c, weight).unwrap_or(1.0));
+        text.chars().map(advance).sum::<f64>() * size
     }
 
     /// `text` in drawable form: control characters, invisible and direction marks, and characters that no

@@ -20,7 +20,7 @@ use std::sync::Arc;
 use crate::base::name::{is_quiet, last_part};
 use crate::base::time::Span;
 use crate::evidence::Confidence;
-use crate::graph::{ById, EdgeId, Element, Node, NodeId, TopicId};
+use crate::graph::{ById, EdgeId, Element, NodeId, TopicId};
 use crate::mission::Mission;
 use crate::mission::event_log::{Interruption, Phase};
 use crate::mission::phases::knows_publishers;
@@ -139,11 +139,6 @@ impl<'a> FigureSource<'a> {
         knows_publishers(&self.mission.elements, &self.mission.sending)
     }
 
-    /// Whether the mission has no nodes but recorders and players, without regard to filters.
-    pub(crate) fn knows_no_node(&self) -> bool {
-        self.mission.elements.nodes.iter().all(Node::is_tool)
-    }
-
     pub(crate) fn shows(&self, topic: TopicId) -> bool {
         self.topics.get(topic) == Some(&true)
     }
@@ -185,11 +180,8 @@ impl<'a> FigureSource<'a> {
 
     /// The strongest confidence to which an element is known.
     pub(crate) fn confidence(&self, what: Element) -> Confidence {
-        let rows = self
-            .mission
-            .graphs
-            .rows(what)
-            .map(|(_, row)| row.confidence);
-        rows.min().unwrap_or(Confidence::Declared)
+        let rows = self.mission.graphs.rows(what);
+        let confidences = rows.map(|(_, row)| row.confidence);
+        confidences.min().unwrap_or(Confidence::Declared)
     }
 }

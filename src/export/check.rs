@@ -22,21 +22,16 @@ pub(crate) fn check(targets: &[Target], kept: &[PathBuf]) -> Result<()> {
     for (at, target) in targets.iter().enumerate() {
         let name = target.path().display();
         if let Some(other) = targets[..at].iter().find(|t| t.may_meet(target)) {
-            let what = if *other == *target {
-                format!("`{name}` is requested twice")
-            } else {
-                format!(
-                    "`{name}` and `{}` may be the same file",
-                    other.path().display()
-                )
+            let what = match other.path().display() {
+                _ if *other == *target => format!("`{name}` is requested twice"),
+                other => format!("`{name}` and `{other}` may be the same file"),
             };
             return Err(Error::usage(what, "give every output its own name"));
         }
         if let Some(path) = kept.iter().find(|path| would_harm(target, path)) {
-            let whose = if path.is_dir() {
-                format!("a file of `{}`", path.display())
-            } else {
-                "an input".to_owned()
+            let whose = match path.display() {
+                folder if path.is_dir() => format!("a file of `{folder}`"),
+                _ => "an input".to_owned(),
             };
             let what = format!("`{name}` would overwrite {whose}");
             return Err(Error::usage(what, "give the output another name"));
@@ -53,18 +48,15 @@ pub(crate) fn check(targets: &[Target], kept: &[PathBuf]) -> Result<()> {
 /// [`Error::Usage`] if a table might replace an input or another file.
 pub(crate) fn check_folder(folder: &Path, ending: &str, kept: &[PathBuf]) -> Result<()> {
     let is_like_a_table = |path: &Path| {
-        path.extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case(ending))
-            && same_file(folder_of(path), folder)
+        let own = path.extension().unwrap_or_default();
+        own.eq_ignore_ascii_case(ending) && same_file(folder_of(path), folder)
     };
     let clash = kept.iter().find(|path| {
         is_like_a_table(path) || path.canonicalize().is_ok_and(|path| is_like_a_table(&path))
     });
     let Some(path) = clash else {
-        let beside = fs::read_dir(folder).into_iter().flatten().flatten();
-        let is_others = beside
-            .map(|entry| entry.path())
-            .any(|path| is_like_a_table(&path));
+        let mut beside = fs::read_dir(folder).into_iter().flatten().flatten();
+        let is_others = beside.any(|entry| is_like_a_table(&entry.path()));
         if !is_others || folder.join(format!("index.{ending}")).exists() {
             return Ok(());
         }
@@ -124,24 +116,19 @@ fn check_place(target: &Target) -> Result<()> {
     }
     let is_text = path.file_name().is_some_and(|name| name.to_str().is_some());
     if Target::Path(path.clone()).is_numbered() && !is_text {
-        return refuse(
-            "`{n}` is in a name that is not UTF-8",
-            "give it a name in UTF-8, or omit `{n}`",
-        );
+        let hint = "give it a name in UTF-8, or omit `{n}`";
+        return refuse("`{n}` is in a name that is not UTF-8", hint);
     }
     let folder = folder_of(path);
     if folder.to_string_lossy().contains(NUMBER) {
         return refuse("`{n}` is in the folder", "put `{n}` into the file's name");
     }
-    let there = folder
-        .ancestors()
-        .find(|f| f.exists() || *f == Path::new(""));
-    let there = there
-        .filter(|f| *f != Path::new(""))
-        .unwrap_or(Path::new("."));
+    let mut around = folder.ancestors().take_while(|f| *f != Path::new(""));
+    let there = around.find(|f| f.exists()).unwrap_or(Path::new("."));
     if !there.is_dir() {
+        let reason = format!("`{}` is not a folder", there.display());
         return refuse(
-            &format!("`{}` is not a folder", there.display()),
+            &reason,
             "give an existing folder, or one that can be created",
         );
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::palette::{Area, Palette};
 use super::sequence::{FrameTime, Sequence};
-use super::sink::OutputSink;
+use super::sink::{OutputSink, write_file};
 use super::target::Target;
 use crate::base::error::Result;
 use crate::draw::paint::raster::Pixels;
@@ -98,7 +98,8 @@ pub trait Encoder: Send {
         |_| Ok(Packet::Nothing)
     }
 
-    /// Begins, before the first packet, with the size of all frames and their palette.
+    /// Begins, before the first packet, with the size of all frames and their palette; called again before further
+    /// packets.
     ///
     /// # Errors
     /// [`Error::Io`](crate::base::error::Error::Io) with the output's path if it cannot be written, or an error of output
@@ -107,11 +108,11 @@ pub trait Encoder: Send {
         Ok(())
     }
 
-    /// Takes the packet of the next frame. `index` is the number of its window in the mission.
+    /// Takes the packet of the next frame.
     ///
     /// # Errors
     /// [`Error::Io`](crate::base::error::Error::Io) with the output's path if it cannot be written.
-    fn take(&mut self, _index: usize, _frame_time: FrameTime, _packet: Packet) -> Result<()> {
+    fn take(&mut self, _frame_time: FrameTime, _packet: Packet) -> Result<()> {
         Ok(())
     }
 
@@ -125,20 +126,24 @@ pub trait Encoder: Send {
 /// The beginning of an output.
 pub(crate) type Started<'a> = Result<Box<dyn Encoder + 'a>>;
 
-/// An output that is written at the end.
-struct AtEnd<W>(W);
-
-impl<W: FnOnce() -> Result<Written> + Send> Encoder for AtEnd<W> {
+/// An output that takes no frames is a function that writes it at the end.
+impl<W: FnOnce() -> Result<Written> + Send> Encoder for W {
     fn finish(self: Box<Self>) -> Result<Written> {
-        (self.0)()
+        self()
     }
 }
 
-/// Begins an output that takes no frames.
-pub(crate) fn at_end<'a>(
-    write: impl FnOnce() -> Result<Written> + Send + 'a,
+/// Begins an output of one drawing, of these bytes.
+pub(crate) fn one_drawing<'a>(
+    target: &Target,
+    bytes: impl FnOnce() -> Result<Vec<u8>> + Send + 'a,
 ) -> Box<dyn Encoder + 'a> {
-    Box::new(AtEnd(write))
+    let target = target.clone();
+    Box::new(move || {
+        let mut written = Written::to(&target);
+        written.add(write_file(&target, &bytes()?)?);
+        Ok(written)
+    })
 }
 
 /// Begins an output of one file that takes no frames; `write` returns remarks for the user.
@@ -152,7 +157,7 @@ pub(crate) fn one_file<'a>(
 ) -> Started<'a> {
     target.must_be_one(reason)?;
     let target = target.clone();
-    Ok(at_end(move || {
+    Ok(Box::new(move || {
         let mut written = Written::to(&target);
         let mut sink = OutputSink::create(&target, None)?;
         written.remarks = write(&mut sink).map_err(sink.error())?;
@@ -174,30 +179,33 @@ pub(crate) fn one_text<'a>(
     })
 }
 
-/// Writes a text per window if the name contains `{n}`; otherwise one of the only window, or of the union of all.
-pub(crate) fn text_per_window(
-    view: &View,
+/// Begins a text per window if the name contains `{n}`; otherwise one of the only window, or of the union of all.
+pub(crate) fn text_per_window<'a>(
+    view: &'a View,
     target: &Target,
-    text: impl Fn(&mut OutputSink, &SeenWindow) -> io::Result<()>,
-) -> Result<Written> {
-    let mut written = Written::to(target);
-    let mut write = |target: &Target, seen: &SeenWindow| -> Result<()> {
-        let mut sink = OutputSink::create(target, None)?;
-        text(&mut sink, seen).map_err(sink.error())?;
-        written.add(sink.commit()?);
-        Ok(())
-    };
-    let frames = &view.frames;
-    if target.is_numbered() {
-        for (k, frame) in frames.iter().enumerate() {
-            write(&target.numbered(frame.index, frames.len()), &view.seen(k))?;
+    text: impl Fn(&mut OutputSink, &SeenWindow) -> io::Result<()> + Send + 'a,
+) -> Box<dyn Encoder + 'a> {
+    let target = target.clone();
+    Box::new(move || {
+        let mut written = Written::to(&target);
+        let mut write = |target: &Target, seen: &SeenWindow| -> Result<()> {
+            let mut sink = OutputSink::create(target, None)?;
+            text(&mut sink, seen).map_err(sink.error())?;
+            written.add(sink.commit()?);
+            Ok(())
+        };
+        let frames = &view.frames;
+        if target.is_numbered() {
+            for (k, frame) in frames.iter().enumerate() {
+                write(&target.numbered(frame.index, frames.len()), &view.seen(k))?;
+            }
+        } else if frames.len() == 1 {
+            write(&target, &view.seen(0))?;
+        } else if let Some(all) = union(view) {
+            write(&target, &all)?;
         }
-    } else if frames.len() == 1 {
-        write(target, &view.seen(0))?;
-    } else if let Some(all) = union(view) {
-        write(target, &all)?;
-    }
-    Ok(written)
+        Ok(written)
+    })
 }
 
 /// Begins an output. Under `max_bytes`, an animation of more bytes fails as [`std::io::ErrorKind::FileTooLarge`].

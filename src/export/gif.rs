@@ -68,7 +68,7 @@ impl Encoder for GifFile {
         Ok(())
     }
 
-    fn take(&mut self, _: usize, frame_time: FrameTime, packet: Packet) -> Result<()> {
+    fn take(&mut self, frame_time: FrameTime, packet: Packet) -> Result<()> {
         let failed = self.error();
         match &mut self.animation {
             Some(animation) => animation.add(packet, frame_time.ms).map_err(failed),
@@ -100,13 +100,11 @@ fn pack(frame: &DrawnFrame<'_>) -> Result<Packet> {
         };
         (area, frame.indices.to_vec())
     } else {
-        match palette::difference(frame.before, frame.indices, width) {
-            Some(area) => (
-                area,
-                palette::patch(frame.before, frame.indices, width, area, clear),
-            ),
-            None => return Ok(Packet::Nothing),
-        }
+        let Some(area) = palette::difference(frame.before, frame.indices, width) else {
+            return Ok(Packet::Nothing);
+        };
+        let patch = palette::patch(frame.before, frame.indices, width, area, clear);
+        (area, patch)
     };
     Ok(Packet::Patch(area, compressed(pixels)))
 }
@@ -182,9 +180,8 @@ impl<W: Write> Animation<W> {
         while left > 0 {
             let part = left.min(LONGEST);
             frame.delay = u16::try_from(part).unwrap_or(u16::MAX);
-            self.encoder
-                .write_lzw_pre_encoded_frame(&frame)
-                .map_err(to_io)?;
+            let written = self.encoder.write_lzw_pre_encoded_frame(&frame);
+            written.map_err(to_io)?;
             left -= part;
             if left > 0 {
                 let pixel = Area {

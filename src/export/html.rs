@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use super::sequence::{Sequence, UnionDrawings};
+use super::sequence::Sequence;
 use super::target::Target;
 use super::{Started, one_text};
 use crate::base::digest;
@@ -116,11 +116,11 @@ fn page(sequence: &Sequence<'_>, style: &Style) -> String {
     };
     let overview = sequence.picture.overview();
     // A chosen style is always used; the default one has a dark variant.
-    let chosen = whole.as_ref().map_or(style, |(_, drawn)| drawn.style);
+    let chosen = whole.as_ref().map_or(style, |(_, (_, style))| style);
     let dark = Style::builtin("dark").ok().filter(|_| chosen == style);
     let timeline = overview.as_ref().map_or("", |o| &o.title);
     let title = sequence.picture.title().unwrap_or(timeline);
-    let graph = |(view, drawn): (_, UnionDrawings<'_>)| PageGraph::new(view, drawn.union);
+    let graph = |(view, (union, _)): (_, (Union, _))| PageGraph::new(view, union);
     // The timeline of topics has a row for each, even if a graph would group them.
     let each = sequence.unfolded.map_or(sequence.view, |u| u.view);
     let page = HtmlPage {
@@ -202,10 +202,8 @@ impl HtmlPage<'_> {
         };
         // Printed pages are white.
         let dark = self.dark.map_or_else(String::new, |dark| {
-            format!(
-                "@media screen and (prefers-color-scheme:dark){{{}}}",
-                rules(dark)
-            )
+            let rules = rules(dark);
+            format!("@media screen and (prefers-color-scheme:dark){{{rules}}}")
         });
         rules(self.style) + &dark + &squeezed(LOOK)
     }
@@ -386,7 +384,9 @@ fn fill(template: &str, value: impl Fn(&str) -> String) -> String {
 // The legend of the signs that occur.
 
 const BOX: &str = "<rect x=\"5\" y=\"4\" width=\"26\" height=\"12\" rx=\"2\"/>";
+const CAPSULE: &str = "<rect x=\"3\" y=\"3\" width=\"30\" height=\"14\" rx=\"7\"/>";
 const LINE: &str = "<path d=\"M3 10h24\"/><path d=\"M34 10l-8-4v8z\"/>";
+const STOPPED: &str = "<path d=\"M3 10h24\"/><path d=\"M27 4h3v12h-3z\"/>";
 
 /// The meaning of the marks that occur on the timeline, as HTML.
 fn timeline_legend(timeline: &Timeline) -> String {
@@ -414,20 +414,14 @@ fn picture(sign: &LegendSign) -> String {
         .replace("y=\"4\"", "y=\"7\"")
         .replace("\"26\"", "\"23\"");
     match sign {
-        LegendSign::Node => group(
-            "node",
-            "<rect x=\"3\" y=\"3\" width=\"30\" height=\"14\" rx=\"7\"/>",
-        ),
+        LegendSign::Node => group("node", CAPSULE),
         LegendSign::Topic => group("topic", BOX),
         LegendSign::Group => group("topic", &format!("{BOX}{front}")),
         LegendSign::Namespace => group("node", &format!("{BOX}{front}")),
         LegendSign::Change(mark) => {
-            let word = mark.badge();
+            let (word, class) = (mark.badge(), mark.class());
             let badge = format!("<use href=\"#{word}\" class=\"{word}\" x=\"31\" y=\"5\"/>");
-            group(
-                &format!("topic {} {word}", mark.class()),
-                &(BOX.to_owned() + &badge),
-            )
+            group(&format!("topic {class} {word}"), &(BOX.to_owned() + &badge))
         }
         LegendSign::Box(State::Latched) => {
             let bar = "<rect class=\"l\" x=\"6\" y=\"5\" width=\"3\" height=\"10\"/>";
@@ -438,10 +432,7 @@ fn picture(sign: &LegendSign) -> String {
         // Pages draw every topic as a box.
         LegendSign::Row => String::new(),
         LegendSign::Service => group("topic", "<path d=\"M3 10l6 -6h18l6 6l-6 6h-18z\"/>"),
-        LegendSign::Starved => group(
-            "edge active stated",
-            "<path d=\"M3 10h24\"/><path d=\"M27 4h3v12h-3z\"/>",
-        ),
+        LegendSign::Starved => group("edge active stated", STOPPED),
         LegendSign::Width => group("edge active w5", LINE),
     }
 }
@@ -516,10 +507,8 @@ impl PageChanges {
         let rows = events.iter().map(|(id, event)| LogRow::Event(*id, event));
         let rows: Vec<LogRow<'_>> = rows.collect();
         let written = row_lines(mission, &rows, LogFormat::Text);
-        let said = events
-            .iter()
-            .zip(&written)
-            .map(|((id, event), line)| (*id, (*event, line)));
+        let said = events.iter().zip(&written);
+        let said = said.map(|((id, event), line)| (*id, (*event, line)));
         let said: BTreeMap<EventId, (&Event, &LogLine)> = said.collect();
         let place = |what: &Element| places.get(what).map_or(-1, |at| i64::from(*at));
         // Two missions have no common time.
@@ -575,20 +564,14 @@ impl PageChanges {
             let headlines = frame.headlines.iter().take(MOST_REPORTED);
             let headlines = headlines.filter_map(|headline| line(frame, headline));
             let lines = interruptions(frame).into_iter().chain(headlines);
-            ChangedWindow(
-                at,
-                frame.counts.total(),
-                counts,
-                lines.chain(returns).collect(),
-                visible(&frame.words(MOST_PHRASES)).into_owned(),
-            )
+            let lines = lines.chain(returns).collect();
+            let words = visible(&frame.words(MOST_PHRASES)).into_owned();
+            ChangedWindow(at, frame.counts.total(), counts, lines, words)
         });
         let windows: Vec<ChangedWindow> = windows.collect();
         // The list has every mark: a part of an event is marked only if the event is listed.
-        let listed = windows
-            .iter()
-            .flat_map(|w| w.3.iter().filter_map(|line| line.4));
-        let listed: BTreeSet<EventId> = listed.collect();
+        let listed = windows.iter().flat_map(|w| &w.3);
+        let listed: BTreeSet<EventId> = listed.filter_map(|line| line.4).collect();
         let whole = |id| mission.log.events.get(id).and_then(|event| event.part_of);
         let is_listed = |id: &EventId| view.compares || listed.contains(&whole(*id).unwrap_or(*id));
         let mut lives = page.sequence.unfolded.and_then(|u| u.lives).cloned();
@@ -616,11 +599,7 @@ impl PageChanges {
             return String::new();
         }
         xml.open("details").attribute("open", "");
-        let summary = if compares {
-            "Differences"
-        } else {
-            "All changes"
-        };
+        let summary = ["All changes", "Differences"][usize::from(compares)];
         xml.leaf("summary", summary);
         if lines.len() > MOST_ROWS {
             let text = format!("The first {MOST_ROWS} of {}:", lines.len());

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::io::Write as _;
 
-use super::{Started, at_end, text_per_window};
+use super::{Started, text_per_window};
 use crate::base::words;
 use crate::draw::picture::{options, short_name};
 use crate::draw::style::{Body, Change, Color, Style};
@@ -15,15 +15,10 @@ use crate::view::{Contents, ItemKind, Mark, SeenWindow, View};
 pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
     let style = Style::builtin("light")?;
     let is_large = sequence.view.arrows.len() > MANY;
-    let view = sequence
-        .paired
-        .filter(|_| is_large)
-        .unwrap_or(sequence.view);
-    let target = target.clone();
-    Ok(at_end(move || {
-        text_per_window(view, &target, |sink, seen| {
-            sink.write_all(chart(view, &style, seen).as_bytes())
-        })
+    let paired = sequence.paired.filter(|_| is_large);
+    let view = paired.unwrap_or(sequence.view);
+    Ok(text_per_window(view, target, move |sink, seen| {
+        sink.write_all(chart(view, &style, seen).as_bytes())
     }))
 }
 
@@ -47,9 +42,8 @@ pub(crate) fn chart(view: &View, style: &Style, seen: &SeenWindow) -> String {
             [false, true] => (arrow.to, arrow.from, ""),
             _ => (arrow.from, arrow.to, ""),
         };
-        let space = view.items[from]
-            .cluster
-            .filter(|at| view.items[to].cluster == Some(*at));
+        let space = view.items[from].cluster;
+        let space = space.filter(|at| view.items[to].cluster == Some(*at));
         let topic = arrow.carries(shown);
         let topic = topic.map_or_else(String::new, |topic| relative(view, space, &topic));
         let rate = shown.hz.filter(|hz| *hz > 0.0).map(words::rate);
@@ -86,10 +80,8 @@ pub(crate) fn chart(view: &View, style: &Style, seen: &SeenWindow) -> String {
         ("space", [cluster.fill, cluster.stroke, cluster.text], ""),
     ];
     for (class, [fill, stroke, text], more) in classes {
-        let _ = writeln!(
-            out,
-            "  classDef {class} fill:{fill},stroke:{stroke},color:{text}{more}"
-        );
+        let colors = format!("fill:{fill},stroke:{stroke},color:{text}");
+        let _ = writeln!(out, "  classDef {class} {colors}{more}");
     }
     out + &marked
 }
@@ -115,15 +107,11 @@ fn members(
             ItemKind::Namespace | ItemKind::Group => ("[[", "]]"),
             ItemKind::Topic => ("[", "]"),
         };
+        let (id, class) = (shown.id, item.kind.word());
         let name = relative(view, home, &item.name);
-        let _ = writeln!(
-            out,
-            "{indent}i{}{open}\"{name}\"{close}:::{}",
-            shown.id,
-            item.kind.word()
-        );
+        let _ = writeln!(out, "{indent}i{id}{open}\"{name}\"{close}:::{class}");
         if let Some(mark) = shown.mark {
-            let _ = writeln!(out, "{indent}class i{} {}", shown.id, mark.class());
+            let _ = writeln!(out, "{indent}class i{id} {}", mark.class());
         }
     }
 }

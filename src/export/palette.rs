@@ -141,7 +141,6 @@ impl Palette {
 const MET: u32 = 4096;
 
 /// Finds the palette indices of colours, with a cache.
-#[derive(Clone, Debug)]
 pub(crate) struct Matcher<'a> {
     palette: &'a Palette,
     met: Vec<Option<(Rgb, u8)>>,
@@ -201,11 +200,9 @@ fn candidates(colours: &[Rgb], cell: usize) -> Vec<u8> {
         near_far
     };
     let farthest = colours.iter().map(|c| reach(c).1).min().unwrap_or(0);
-    (0_u8..=255)
-        .zip(colours)
-        .filter(|(_, colour)| reach(colour).0 <= farthest)
-        .map(|(index, _)| index)
-        .collect()
+    let near = (0_u8..=255).zip(colours);
+    let near = near.filter(|(_, colour)| reach(colour).0 <= farthest);
+    near.map(|(index, _)| index).collect()
 }
 
 /// A rectangle of pixels.

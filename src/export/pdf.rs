@@ -3,11 +3,10 @@
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
-use super::{Encoder, Needs, OneDrawing, Pack, Packet, Started, Written};
+use super::{Encoder, Needs, OneDrawing, Pack, Packet, Started, Written, one_drawing};
 use crate::base::error::{Error, Result};
 use crate::base::words;
 use crate::draw::paint::pdf::{self, PdfPage};
-use crate::draw::scene::Scene;
 use crate::export::sequence::{FrameTime, Sequence, Shows};
 use crate::export::sink::write_file;
 use crate::export::target::Target;
@@ -17,8 +16,6 @@ const WAITING: usize = 4;
 
 struct Book<'a> {
     sequence: &'a Sequence<'a>,
-    /// The only page, if it is not a sequence.
-    strip: Option<&'a Scene>,
     target: Target,
     /// The channel for pages; a document cannot move between threads, so it has its own thread.
     sheets: SyncSender<PdfPage>,
@@ -31,32 +28,29 @@ struct Book<'a> {
 /// [`Error::Usage`] for a name with `{n}`.
 pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
     target.must_be_one("a PDF has a page per window")?;
+    if let Shows::Whole(scene) = sequence.shows(target, OneDrawing::Asked) {
+        let own = target.clone();
+        return Ok(one_drawing(target, move || {
+            let (scene, entry) = (scene.clone(), scene.title.clone());
+            let page = std::iter::once(PdfPage { scene, entry });
+            pdf::write(page, sequence.fonts).map_err(|reason| failed(&own, &reason))
+        }));
+    }
     let (sheets, waiting) = sync_channel(WAITING);
     let fonts = sequence.fonts.clone();
     Ok(Box::new(Book {
         sequence,
-        strip: match sequence.shows(target, OneDrawing::Asked) {
-            Shows::Whole(scene) => Some(scene),
-            Shows::Film | Shows::Windows => None,
-        },
         target: target.clone(),
         sheets,
         press: thread::spawn(move || pdf::write(waiting.iter(), &fonts)),
     }))
 }
 
-const HINT: &str = "write `.svg` with `{n}` instead";
+fn failed(target: &Target, reason: &str) -> Error {
+    Error::output(target.path(), reason, "write `.svg` with `{n}` instead")
+}
 
 impl Book<'_> {
-    fn failed(&self, reason: &str) -> Error {
-        Error::output(self.target.path(), reason, HINT)
-    }
-
-    fn add(&self, scene: Scene, entry: String) -> Result<()> {
-        let sent = self.sheets.send(PdfPage { scene, entry });
-        sent.map_err(|_| self.failed("the document ended early"))
-    }
-
     /// The time of a window and its first change.
     fn entry(&self, place: usize) -> String {
         let frame = self.sequence.view.frames.get(place);
@@ -69,47 +63,30 @@ impl Book<'_> {
 
 impl Encoder for Book<'_> {
     fn needs(&self) -> Needs {
-        match self.strip {
-            Some(_) => Needs::Nothing,
-            None => Needs::Scene,
-        }
+        Needs::Scene
     }
 
     fn pack(&self) -> Pack {
         |frame| Ok(Packet::Drawing(Box::new(frame.scene.clone())))
     }
 
-    fn take(&mut self, _: usize, frame_time: FrameTime, packet: Packet) -> Result<()> {
-        match packet {
-            Packet::Drawing(scene) => self.add(*scene, self.entry(frame_time.window)),
-            _ => Ok(()),
+    fn take(&mut self, frame_time: FrameTime, packet: Packet) -> Result<()> {
+        if let Packet::Drawing(scene) = packet {
+            let (scene, entry) = (*scene, self.entry(frame_time.window));
+            let sent = self.sheets.send(PdfPage { scene, entry });
+            sent.map_err(|_| failed(&self.target, "the document ended early"))?;
         }
+        Ok(())
     }
 
     fn finish(self: Box<Self>) -> Result<Written> {
-        if let Some(scene) = self.strip {
-            self.add(scene.clone(), scene.title.clone())?;
-        }
-        let Self {
-            target,
-            sheets,
-            press,
-            ..
-        } = *self;
         // Dropping the sender ends the thread.
-        drop(sheets);
-        let bytes = match press.join() {
-            Ok(Ok(bytes)) => bytes,
-            Ok(Err(reason)) => {
-                return Err(Error::output(target.path(), reason, HINT));
-            }
-            Err(_) => {
-                let reason = "the document is not valid";
-                return Err(Error::output(target.path(), reason, HINT));
-            }
-        };
-        let mut written = Written::to(&target);
-        written.add(write_file(&target, &bytes)?);
+        drop(self.sheets);
+        let pressed = self.press.join();
+        let pressed = pressed.unwrap_or_else(|_| Err("the document is not valid".to_owned()));
+        let bytes = pressed.map_err(|reason| failed(&self.target, &reason))?;
+        let mut written = Written::to(&self.target);
+        written.add(write_file(&self.target, &bytes)?);
         Ok(written)
     }
 }

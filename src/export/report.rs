@@ -18,7 +18,7 @@ use crate::graph::{Element, Existence};
 use crate::mission::Mission;
 use crate::mission::info::summary::{Most, described};
 use crate::mission::info::{Info, how_many, info};
-use crate::view::{Frame, View};
+use crate::view::View;
 
 /// The most bytes of each part; together they stay below 256 KiB, a quarter of the limit of a job summary.
 const MOST_CHANGES: usize = 96 << 10;
@@ -50,16 +50,11 @@ fn report(sequence: &Sequence<'_>) -> String {
     if !links.is_empty() {
         let _ = writeln!(out, "{}\n", links.join(" · "));
     }
+    let mut links = sequence.options.links.iter();
+    let first = view.frames.first();
     let times = ReportTimes {
-        start: view
-            .frames
-            .first()
-            .map_or(mission.span.start, |f| f.span.start),
-        player: sequence
-            .options
-            .links
-            .iter()
-            .find(|(name, _)| name == "player"),
+        start: first.map_or(mission.span.start, |f| f.span.start),
+        player: links.find(|(name, _)| name == "player"),
     };
     out.push_str(&phases(mission, &times));
     out.push_str(&changes(mission, view, &times));
@@ -97,9 +92,8 @@ fn verdict(sequence: &Sequence<'_>, view: &View, info: &Info) -> String {
     let Some(first) = view.frames.first() else {
         return format!("**{}**: no windows.", plain(&title));
     };
-    let changed = (0..view.frames.len())
-        .filter(|k| view.is_changed(*k))
-        .count();
+    let changed = view.frames.iter().filter(|frame| frame.is_changed());
+    let changed = changed.count();
     let of_them = (changed > 0).then(|| format!(", {changed} of them with changes"));
     let lengths = words::period(first.span.nanos());
     let date = words::date_and_clock(first.span.start.0);
@@ -177,8 +171,10 @@ fn phases(mission: &Mission, times: &ReportTimes<'_>) -> String {
 fn changes(mission: &Mission, view: &View, times: &ReportTimes<'_>) -> String {
     let frames = view.frames.iter().filter(|f| !f.headlines.is_empty());
     let rows = frames.map(|frame| {
-        let window = times.link(frame.span.start);
-        row(&[window, changes_of(mission, frame)])
+        let events = frame.headlines.iter().map(|headline| headline.event);
+        let events = events.filter_map(|id| Some((id, mission.log.events.get(id)?)));
+        let changes = described(mission, &events.collect::<Vec<_>>(), EACH_KIND);
+        row(&[times.link(frame.span.start), plain(&changes)])
     });
     let mut open: Vec<String> = rows.collect();
     let rest = open.split_off(open.len().min(MOST_OPEN));
@@ -187,13 +183,6 @@ fn changes(mission: &Mission, view: &View, times: &ReportTimes<'_>) -> String {
     let summary = format!("{} more with changes", words::count(rest.len(), "window"));
     let rest = folded_table(&summary, &heads, rest, MOST_CHANGES / 2);
     table.map_or(String::new(), |table| table + "\n") + &rest
-}
-
-/// The changes of a window.
-fn changes_of(mission: &Mission, frame: &Frame) -> String {
-    let events = frame.headlines.iter().map(|headline| headline.event);
-    let events = events.filter_map(|id| Some((id, mission.log.events.get(id)?)));
-    plain(&described(mission, &events.collect::<Vec<_>>(), EACH_KIND))
 }
 
 /// A rate in Hz; a dash for none.
@@ -217,10 +206,8 @@ fn known_by(evidence: Evidence) -> String {
 
 /// The elements that a view shows.
 fn shown(view: &View) -> BTreeSet<Element> {
-    view.items
-        .iter()
-        .flat_map(|item| item.members.iter().copied())
-        .collect()
+    let members = view.items.iter().flat_map(|item| &item.members);
+    members.copied().collect()
 }
 
 /// Every node that is shown.
@@ -296,22 +283,12 @@ fn evidence(mission: &Mission, info: &Info) -> String {
         let _ = writeln!(out, "- to learn more: {}", plain(line));
     }
     for bag in mission.bags.iter().take(50) {
-        let state = if bag.complete {
-            "complete"
-        } else {
-            "incomplete"
-        };
-        let _ = writeln!(
-            out,
-            "- {}: {}, {state}",
-            plain(&bag.name),
-            plain(&bag.format)
-        );
+        let (name, format) = (plain(&bag.name), plain(&bag.format));
+        let state = ["incomplete", "complete"][usize::from(bag.complete)];
+        let _ = writeln!(out, "- {name}: {format}, {state}");
     }
-    folded(
-        "Strength of the evidence",
-        &(out.trim_end().to_owned() + "\n"),
-    )
+    let out = out.trim_end().to_owned() + "\n";
+    folded("Strength of the evidence", &out)
 }
 
 #[cfg(test)]

@@ -54,10 +54,11 @@ pub(crate) fn pass(
     let mut jobs: Vec<OutputJob<'_>> = outputs.iter().map(start).collect::<Result<_>>()?;
     // Films leave windows out that files have, and are the same whatever else is written.
     for is_film in [true, false] {
-        let some = jobs.iter_mut();
-        let some = some.filter(|job| job.output.format.is_film() == is_film);
-        let mut some: Vec<&mut OutputJob<'_>> = some.collect();
-        if some.iter().any(|job| job.needs() > Needs::Nothing) {
+        let is_one = |job: &&mut OutputJob<'_>| {
+            job.output.format.is_film() == is_film && job.needs() > Needs::Nothing
+        };
+        let mut some: Vec<_> = jobs.iter_mut().filter(is_one).collect();
+        if !some.is_empty() {
             play(sequence, &mut some, is_film, progress)?;
         }
     }
@@ -67,97 +68,67 @@ pub(crate) fn pass(
 /// An output being written.
 struct OutputJob<'a> {
     output: &'a Output,
-    encoder: Option<Box<dyn Encoder + 'a>>,
-    has_begun: bool,
-    /// The error that ended it early.
-    ended: Option<Error>,
+    /// Its encoder, or the error that ended it early.
+    encoder: Result<Box<dyn Encoder + 'a>>,
 }
 
 impl<'a> OutputJob<'a> {
     fn start(sequence: &'a Sequence<'a>, output: &'a Output) -> Result<Self> {
         Ok(Self {
             output,
-            encoder: Some((output.format.start)(sequence, &output.target)?),
-            has_begun: false,
-            ended: None,
+            encoder: Ok((output.format.start)(sequence, &output.target)?),
         })
     }
 
-    fn needs(&self) -> Needs {
-        let needs = self.encoder.as_ref().map(|e| e.needs());
-        needs.unwrap_or(Needs::Nothing)
-    }
-
     /// The data that it needs for every frame; none once it has ended.
-    fn want(&self) -> FrameWant {
+    fn needs(&self) -> Needs {
         let encoder = self.encoder.as_ref();
-        FrameWant {
-            needs: self.needs(),
-            pack: encoder.map_or(|_| Ok(Packet::Nothing), |e| e.pack()),
-        }
+        encoder.map_or(Needs::Nothing, |encoder| encoder.needs())
     }
 
     /// Takes packets, unless it has ended.
-    fn take(&mut self, size: (u32, u32), palette: &Palette, packets: Vec<Waiting>) {
-        let Some(mut encoder) = self.encoder.take() else {
+    fn take(&mut self, size: (u32, u32), palette: &Palette, packets: Vec<(FrameTime, Packet)>) {
+        let Ok(encoder) = &mut self.encoder else {
             return;
         };
-        let needs = encoder.needs();
-        let take = || -> Result<()> {
-            if needs > Needs::Nothing && !self.has_begun {
-                encoder.begin(size, palette)?;
-                self.has_begun = true;
-            }
-            for Waiting(index, frame_time, packet) in packets {
-                if needs > Needs::Nothing {
-                    encoder.take(index, frame_time, packet)?;
-                }
-            }
-            Ok(())
-        };
-        match take() {
-            Ok(()) => self.encoder = Some(encoder),
-            Err(error) => self.ended = Some(error),
+        let begun = encoder.begin(size, palette);
+        let mut packets = packets.into_iter();
+        let mut take = |(frame_time, packet)| encoder.take(frame_time, packet);
+        if let Err(error) = begun.and_then(|()| packets.try_for_each(&mut take)) {
+            self.encoder = Err(error);
         }
     }
 
     /// The error that must end the whole run, if any.
     fn failure(&mut self) -> Result<()> {
-        match self.ended.take() {
-            Some(error) if !self.is_harmless(&error) => Err(error),
+        match std::mem::replace(&mut self.encoder, Err(Error::Interrupted)) {
+            Err(error) if !is_harmless(self.output, &error) => Err(error),
             other => {
-                self.ended = other;
+                self.encoder = other;
                 Ok(())
             }
         }
     }
 
-    /// Whether only this output ends: its reader closed the pipe, or it is too large and will be retried.
-    fn is_harmless(&self, error: &Error) -> bool {
-        kind(error) == Some(io::ErrorKind::BrokenPipe) || self.is_too_large(error)
-    }
-
-    fn is_too_large(&self, error: &Error) -> bool {
-        self.output.format.takes("max-bytes", false)
-            && kind(error) == Some(io::ErrorKind::FileTooLarge)
-    }
-
-    fn finish(mut self) -> Result<Option<Written>> {
-        let result = match (self.encoder.take(), self.ended.take()) {
-            (Some(encoder), _) => encoder.finish(),
-            (None, Some(error)) => Err(error),
-            (None, None) => Ok(Written::default()),
-        };
-        match result {
+    fn finish(self) -> Result<Option<Written>> {
+        match self.encoder.and_then(Encoder::finish) {
             Ok(written) => Ok(Some(written)),
-            Err(error) if self.is_too_large(&error) => Ok(None),
-            Err(error) if self.is_harmless(&error) => Ok(Some(Written {
-                path: self.output.target.path().to_owned(),
-                ..Written::default()
-            })),
+            Err(error) if is_too_large(self.output, &error) => Ok(None),
+            Err(error) if is_harmless(self.output, &error) => {
+                Ok(Some(Written::to(&self.output.target)))
+            }
             Err(error) => Err(error),
         }
     }
+}
+
+/// Whether an error ends only this output: its reader closed the pipe, or it is too large and will be retried.
+fn is_harmless(output: &Output, error: &Error) -> bool {
+    kind(error) == Some(io::ErrorKind::BrokenPipe) || is_too_large(output, error)
+}
+
+fn is_too_large(output: &Output, error: &Error) -> bool {
+    output.format.takes("max-bytes", false) && kind(error) == Some(io::ErrorKind::FileTooLarge)
 }
 
 fn kind(error: &Error) -> Option<io::ErrorKind> {
@@ -172,9 +143,6 @@ pub(crate) fn cores() -> usize {
     rayon::current_num_threads()
 }
 
-/// A packet with the index of its window and the time of its frame.
-struct Waiting(usize, FrameTime, Packet);
-
 /// Draws all frames, of films or of files, and passes them on in order while the next ones are drawn.
 fn play(
     sequence: &Sequence<'_>,
@@ -183,20 +151,23 @@ fn play(
     progress: &mut Progress<'_>,
 ) -> Result<()> {
     let frame_times = sequence.frame_times(is_film);
-    let wants: Vec<FrameWant> = jobs.iter().map(|job| job.want()).collect();
-    let pool = RasterPool::new(sequence, &frame_times, &wants)?;
+    let needs = jobs.iter().map(|job| job.needs()).max();
+    let packs = jobs.iter().flat_map(|job| &job.encoder);
+    let packs: Vec<Pack> = packs.map(|encoder| encoder.pack()).collect();
+    let needs = needs.unwrap_or(Needs::Nothing);
+    let pool = RasterPool::new(sequence, &frame_times, needs, &packs)?;
     let mut done = 0;
     pool.run(|row| {
         done += row.len();
         let size = row.first().map_or((0, 0), |packed| packed.size);
-        let queues = by_output(sequence, row, jobs.len());
+        let queues = by_output(row, jobs.len());
         let each = jobs.par_iter_mut().zip(queues);
         each.for_each(|(job, packets)| job.take(size, &pool.palette, packets));
         jobs.iter_mut().try_for_each(|job| job.failure())?;
         if progress(done, frame_times.len()).is_break() {
             return Err(Error::Interrupted);
         }
-        Ok(if jobs.iter().all(|job| job.encoder.is_none()) {
+        Ok(if jobs.iter().all(|job| job.encoder.is_err()) {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
@@ -205,13 +176,11 @@ fn play(
 }
 
 /// The packets of each output.
-fn by_output(sequence: &Sequence<'_>, row: Vec<Packed>, outputs: usize) -> Vec<Vec<Waiting>> {
-    let mut queues: Vec<Vec<Waiting>> = (0..outputs).map(|_| Vec::new()).collect();
+fn by_output(row: Vec<Packed>, outputs: usize) -> Vec<Vec<(FrameTime, Packet)>> {
+    let mut queues: Vec<Vec<_>> = (0..outputs).map(|_| Vec::new()).collect();
     for packed in row {
-        let window = sequence.view.frames.get(packed.frame_time.window);
-        let index = window.map_or(0, |frame| frame.index);
         for (queue, packet) in queues.iter_mut().zip(packed.packets) {
-            queue.push(Waiting(index, packed.frame_time, packet));
+            queue.push((packed.frame_time, packet));
         }
     }
     queues
@@ -240,9 +209,8 @@ pub(crate) fn fit(
         smaller.options = options;
         let outcome = pass(&smaller, std::slice::from_ref(output), progress)?;
         if let Some(Some(mut written)) = outcome.into_iter().next() {
-            written
-                .remarks
-                .push(given_up(&sequence.options, &smaller.options));
+            let remark = given_up(&sequence.options, &smaller.options);
+            written.remarks.push(remark);
             return Ok(written);
         }
     }
@@ -259,10 +227,10 @@ fn steps(asked: &SequenceOptions) -> Vec<SequenceOptions> {
         ..asked.clone()
     };
     let mut steps = SCALES.map(scaled).to_vec();
-    let smallest = scaled(SCALES[SCALES.len() - 1]);
+    let smallest = || scaled(SCALES[SCALES.len() - 1]);
     steps.extend(EVERY.map(|every| SequenceOptions {
         every,
-        ..smallest.clone()
+        ..smallest()
     }));
     steps.extend(LAST_SCALES.map(|by| SequenceOptions {
         changes_only: true,
@@ -274,18 +242,15 @@ fn steps(asked: &SequenceOptions) -> Vec<SequenceOptions> {
 /// What was dropped between `asked` and `now`, as text.
 fn given_up(asked: &SequenceOptions, now: &SequenceOptions) -> String {
     let mut words = Vec::new();
+    let (percent, every) = (now.scale / asked.scale * 100.0, now.every);
     if now.scale < asked.scale {
-        words.push(format!(
-            "scaled to {:.0} %",
-            now.scale / asked.scale * 100.0
-        ));
+        words.push(format!("scaled to {percent:.0} %"));
     }
     if now.changes_only {
         words.push("showed only the windows with a change".to_owned());
-    } else if now.every > asked.every {
+    } else if every > asked.every {
         words.push(format!(
-            "showed one of every {} windows, and all with a change",
-            now.every
+            "showed one of every {every} windows, and all with a change"
         ));
     }
     let most = now.max_bytes.unwrap_or(0);
@@ -310,13 +275,6 @@ const LOOKED_AT: usize = 3;
 /// The most frames that a palette is made from: some of those with a change, some of all.
 const SAMPLES: usize = 12;
 
-/// The data that an output needs for every frame.
-#[derive(Clone, Copy)]
-pub(crate) struct FrameWant {
-    pub(crate) needs: Needs,
-    pub(crate) pack: Pack,
-}
-
 /// A frame, drawn and packed.
 pub(crate) struct Packed {
     pub(crate) frame_time: FrameTime,
@@ -329,8 +287,9 @@ pub(crate) struct Packed {
 pub(crate) struct RasterPool<'a> {
     sequence: &'a Sequence<'a>,
     frame_times: &'a [FrameTime],
-    wants: &'a [FrameWant],
+    /// The most that an output needs for every frame.
     needs: Needs,
+    packs: &'a [Pack],
     /// The palette of the whole sequence; one black unless indices are needed.
     palette: Palette,
     /// The size of a page, in the pixels of the picture.
@@ -343,14 +302,14 @@ impl<'a> RasterPool<'a> {
     pub(crate) fn new(
         sequence: &'a Sequence<'a>,
         frame_times: &'a [FrameTime],
-        wants: &'a [FrameWant],
+        needs: Needs,
+        packs: &'a [Pack],
     ) -> Result<Self> {
-        let needs = wants.iter().map(|want| want.needs).max();
         let mut pool = Self {
             sequence,
             frame_times,
-            wants,
-            needs: needs.unwrap_or(Needs::Nothing),
+            needs,
+            packs,
             palette: Palette::new(Vec::new()),
             page: Size::new(1.0, 1.0),
             threads: rayon::current_num_threads(),
@@ -414,7 +373,7 @@ impl<'a> RasterPool<'a> {
         let scale = self.sequence.options.scale;
         let pixels = self.page.w * self.page.h * scale * scale;
         // A packet has at most a byte per pixel.
-        let outputs = self.wants.len() as f64;
+        let outputs = self.packs.len() as f64;
         let fits =
             |each: &usize| (ROWS_AHEAD * cores * each) as f64 * pixels * outputs <= MOST_BYTES;
         let most = (1..=MOST_IN_A_ROW).rev().find(fits).unwrap_or(1);
@@ -426,16 +385,13 @@ impl<'a> RasterPool<'a> {
     }
 
     fn scene(&self, frame_time: FrameTime) -> Scene {
-        let picture = self.sequence.picture;
-        picture.scene(frame_time.window)
+        self.sequence.picture.scene(frame_time.window)
     }
 
     /// A palette from a few frames.
     fn survey(&self) -> Result<Palette> {
-        let is_changed = |at: &usize| {
-            let window = self.frame_times[*at].window;
-            self.sequence.view.is_changed(window)
-        };
+        let view = self.sequence.view;
+        let is_changed = |at: &usize| view.is_changed(self.frame_times[*at].window);
         let all: Vec<usize> = (0..self.frame_times.len()).collect();
         let changed: Vec<usize> = all.iter().copied().filter(is_changed).collect();
         let mut sample: Vec<usize> = spread(&changed, SAMPLES / 2).collect();
@@ -447,8 +403,7 @@ impl<'a> RasterPool<'a> {
             let mut canvas = Canvas::new(self.sequence.painter, self.sequence.options.scale);
             let mut census = Census::default();
             for at in places {
-                let scene = self.scene(self.frame_times[*at]);
-                let drawn = canvas.draw(scene)?;
+                let drawn = canvas.draw(self.scene(self.frame_times[*at]))?;
                 census.count(&drawn.pixels.rgba);
             }
             Ok(census)
@@ -490,10 +445,10 @@ impl<'a> Drawer<'a> {
         {
             self.frame(before, &[])?;
         }
-        row.map(|at| self.frame(at, self.pool.wants)).collect()
+        row.map(|at| self.frame(at, self.pool.packs)).collect()
     }
 
-    fn frame(&mut self, at: usize, wants: &[FrameWant]) -> Result<Packed> {
+    fn frame(&mut self, at: usize, packs: &[Pack]) -> Result<Packed> {
         let needs = self.pool.needs;
         let frame_time = self.pool.frame_times[at];
         let scene = self.pool.scene(frame_time);
@@ -510,9 +465,8 @@ impl<'a> Drawer<'a> {
             self.indices.clone_from(&self.before);
             self.indices.resize(pixels.rgba.len() / 4, 0);
             for bytes in drawn.changed() {
-                let places = bytes.start / 4..bytes.end / 4;
-                self.matcher
-                    .map(&pixels.rgba[bytes], &mut self.indices[places]);
+                let places = &mut self.indices[bytes.start / 4..bytes.end / 4];
+                self.matcher.map(&pixels.rgba[bytes], places);
             }
         }
         self.at = Some(at);
@@ -523,14 +477,11 @@ impl<'a> Drawer<'a> {
             indices: &self.indices,
             before: if at == 0 { &[] } else { &self.before },
         };
-        let pack = |want: &FrameWant| match want.needs {
-            Needs::Nothing => Ok(Packet::Nothing),
-            _ => (want.pack)(&frame),
-        };
+        let packets = packs.iter().map(|pack| pack(&frame));
         Ok(Packed {
             frame_time,
             size: (pixels.width, pixels.height),
-            packets: wants.iter().map(pack).collect::<Result<_>>()?,
+            packets: packets.collect::<Result<_>>()?,
         })
     }
 }

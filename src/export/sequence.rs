@@ -31,8 +31,8 @@ pub trait Drawings: Sync {
         None
     }
 
-    /// The graph of all windows, for outputs that draw the graph once, if any.
-    fn graph(&self) -> Option<UnionDrawings<'_>> {
+    /// The graph of all windows and its style, for outputs that draw the graph once, if any.
+    fn graph(&self) -> Option<(Union, &Style)> {
         None
     }
 
@@ -45,15 +45,6 @@ pub trait Drawings: Sync {
 /// No drawings, for outputs that show none.
 impl Drawings for () {}
 
-/// The graph of all windows, drawn once.
-#[derive(Clone, Debug)]
-pub struct UnionDrawings<'a> {
-    /// The drawing of every element.
-    pub union: Union,
-    /// The style of the drawing.
-    pub style: &'a Style,
-}
-
 impl Drawings for Picture<'_> {
     fn scene(&self, window: usize) -> Scene {
         self.scene(window)
@@ -63,11 +54,8 @@ impl Drawings for Picture<'_> {
         Some(self.title_text())
     }
 
-    fn graph(&self) -> Option<UnionDrawings<'_>> {
-        Some(UnionDrawings {
-            union: self.union(),
-            style: self.style(),
-        })
+    fn graph(&self) -> Option<(Union, &Style)> {
+        Some((self.union(), self.style()))
     }
 }
 

@@ -11,7 +11,6 @@ use crate::base::error::{Error, Result};
 use crate::base::file::Leftover;
 
 /// A file (or standard output) in progress. Dropped without [`OutputSink::commit`], a file is removed.
-#[derive(Debug)]
 pub(crate) struct OutputSink {
     /// The path as given.
     path: PathBuf,
@@ -22,7 +21,6 @@ pub(crate) struct OutputSink {
     limit: u64,
 }
 
-#[derive(Debug)]
 enum SinkTarget {
     Stdout(io::Stdout),
     /// An existing device or pipe, which is not renamed.
@@ -47,10 +45,10 @@ impl OutputSink {
             Target::Stdout if limit.is_some() => Ok(SinkTarget::Memory(Vec::new())),
             // Output requested on standard output is not a message of the library.
             Target::Stdout => Ok(SinkTarget::Stdout(io::stdout())),
-            Target::Path(path) if is_special(path) => File::options()
-                .write(true)
-                .open(path)
-                .map(SinkTarget::Special),
+            Target::Path(path) if is_special(path) => {
+                let file = File::options().write(true).open(path);
+                file.map(SinkTarget::Special)
+            }
             Target::Path(path) => hidden(folder_of(path)),
         };
         let place = match target {
@@ -211,13 +209,8 @@ fn proc_path(file: &File) -> String {
 #[cfg(target_os = "linux")]
 fn link(file: &File, name: &Path) -> io::Result<()> {
     use rustix::fs::{AtFlags, CWD, linkat};
-    Ok(linkat(
-        CWD,
-        proc_path(file),
-        CWD,
-        name,
-        AtFlags::SYMLINK_FOLLOW,
-    )?)
+    let linked = linkat(CWD, proc_path(file), CWD, name, AtFlags::SYMLINK_FOLLOW);
+    Ok(linked?)
 }
 
 /// Checks whether a file can be created in `folder`; leaves no file.

@@ -9,12 +9,13 @@ use image::{ExtendedColorType, ImageEncoder as _};
 use super::sequence::{FrameTime, Sequence, Shows};
 use super::sink::write_file;
 use super::target::Target;
-use super::{DrawnFrame, Encoder, Needs, OneDrawing, Pack, Packet, Started, Written, one_file};
+use super::{
+    DrawnFrame, Encoder, Needs, OneDrawing, Pack, Packet, Started, Written, one_drawing, one_file,
+};
 use crate::base::error::{Error, Result};
 use crate::draw::paint::animated::AnimatedScenes;
 use crate::draw::paint::raster::Pixels;
 use crate::draw::paint::svg;
-use crate::draw::scene::Scene;
 
 /// The formats of still drawings.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -27,10 +28,7 @@ pub(crate) enum StillKind {
 struct Images<'a> {
     kind: StillKind,
     sequence: &'a Sequence<'a>,
-    /// The one drawing to write, if it is not a sequence.
-    strip: Option<&'a Scene>,
     target: Target,
-    windows: usize,
     written: Written,
 }
 
@@ -47,38 +45,29 @@ pub(crate) fn start<'a>(
         StillKind::Svg => OneDrawing::Asked,
         StillKind::Png | StillKind::WebP => OneDrawing::Always,
     };
-    let strip = match (kind, sequence.shows(target, whole)) {
-        (StillKind::Svg, Shows::Film) => return animation(sequence, target),
-        (_, Shows::Whole(scene)) => Some(scene),
-        (_, Shows::Film | Shows::Windows) => None,
-    };
-    Ok(Box::new(Images {
-        kind,
-        sequence,
-        strip,
-        target: target.clone(),
-        windows: sequence.view.frames.len(),
-        written: Written::to(target),
-    }))
-}
-
-impl Images<'_> {
-    /// The one drawing, encoded.
-    fn alone(&self, scene: &Scene) -> Result<Vec<u8>> {
-        if self.kind == StillKind::Svg {
-            return Ok(svg::write(scene).into_bytes());
-        }
-        let scale = self.sequence.options.scale;
-        encoded(self.kind, &self.sequence.painter.paint(scene, scale)?)
+    match sequence.shows(target, whole) {
+        Shows::Film if kind == StillKind::Svg => animation(sequence, target),
+        Shows::Whole(scene) => Ok(one_drawing(target, move || {
+            if kind == StillKind::Svg {
+                return Ok(svg::write(scene).into_bytes());
+            }
+            let scale = sequence.options.scale;
+            encoded(kind, &sequence.painter.paint(scene, scale)?)
+        })),
+        Shows::Film | Shows::Windows => Ok(Box::new(Images {
+            kind,
+            sequence,
+            target: target.clone(),
+            written: Written::to(target),
+        })),
     }
 }
 
 impl Encoder for Images<'_> {
     fn needs(&self) -> Needs {
-        match (self.strip, self.kind) {
-            (Some(_), _) => Needs::Nothing,
-            (None, StillKind::Svg) => Needs::Scene,
-            (None, _) => Needs::Pixels,
+        match self.kind {
+            StillKind::Svg => Needs::Scene,
+            StillKind::Png | StillKind::WebP => Needs::Pixels,
         }
     }
 
@@ -90,20 +79,17 @@ impl Encoder for Images<'_> {
         }
     }
 
-    fn take(&mut self, index: usize, _: FrameTime, packet: Packet) -> Result<()> {
-        let Packet::Bytes(bytes) = packet else {
-            return Ok(());
-        };
-        let target = self.target.numbered(index, self.windows);
-        self.written.add(write_file(&target, &bytes)?);
+    fn take(&mut self, frame_time: FrameTime, packet: Packet) -> Result<()> {
+        if let Packet::Bytes(bytes) = packet {
+            let frames = &self.sequence.view.frames;
+            let index = frames[frame_time.window].index;
+            let target = self.target.numbered(index, frames.len());
+            self.written.add(write_file(&target, &bytes)?);
+        }
         Ok(())
     }
 
-    fn finish(mut self: Box<Self>) -> Result<Written> {
-        if let Some(scene) = self.strip {
-            let bytes = self.alone(scene)?;
-            self.written.add(write_file(&self.target, &bytes)?);
-        }
+    fn finish(self: Box<Self>) -> Result<Written> {
         Ok(self.written)
     }
 }

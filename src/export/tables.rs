@@ -14,7 +14,7 @@ use super::parquet;
 use super::sequence::Sequence;
 use super::sink::OutputSink;
 use super::target::{Target, is_special};
-use super::{Started, Written, at_end};
+use super::{Started, Written};
 use crate::base::csv;
 use crate::base::error::{Error, Result};
 use crate::base::file::Leftover;
@@ -22,7 +22,7 @@ use crate::base::table::{Batch, ColumnKind, ColumnOf, TableCell, TableWriter, co
 use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
 use crate::graph::{Element, ElementState, Id as _, Node, NodeId, NodeLoad, Topic};
-use crate::mission::event_log::{Detail, Event, EventId};
+use crate::mission::event_log::{Detail, EventId};
 use crate::mission::{Change, Mission};
 
 /// Checks whether several files can be derived from this name.
@@ -35,8 +35,9 @@ pub(crate) fn check(target: &Target) -> Result<()> {
         Target::Path(path) if is_special(path) => format!("`{}` is one", path.display()),
         Target::Path(_) => return target.must_be_one("the tables contain all windows"),
     };
+    let what = format!("the tables are several files, {what}");
     Err(Error::usage(
-        format!("the tables are several files, {what}"),
+        what,
         "give a file: `-o x.csv` writes `x.edges.csv` and others",
     ))
 }
@@ -58,7 +59,7 @@ pub(crate) fn start<'a>(
 ) -> Started<'a> {
     check(target)?;
     let target = target.clone();
-    Ok(at_end(move || {
+    Ok(Box::new(move || {
         let each = TABLES.iter().zip(files(&target, format.word()));
         let write = |(table, file): (&Table, Target)| {
             let rows = |row: RowTaker<'_>| (table.fill)(sequence.data, row);
@@ -180,10 +181,10 @@ macro_rules! element_columns {
 
 element_columns! {
     WIN "win" I64 |_, one| TableCell::count(one.win);
-    START "start_ns" Time |_, one| begins(one.span);
-    END "end_ns" Time |_, one| ends(one.span);
-    LENGTH "length_ns" I64 |_, one| length(one.span);
-    WHAT "what" Text |_, one| what(one.state.what);
+    START "start_ns" Time |_, one| TableCell::Time(one.span.start);
+    END "end_ns" Time |_, one| TableCell::Time(one.span.end);
+    LENGTH "length_ns" I64 |_, one| TableCell::Int(one.span.nanos());
+    WHAT "what" Text |_, one| TableCell::text(one.state.what.word());
     NODE "node" Text |all, one| node(all, one.state.what);
     ROLE "node_role" Text |all, one| text(node_of(all, one).map(|node| &*node.role));
     TOPIC "topic" Text |all, one| topic(all, one.state.what);
@@ -272,11 +273,11 @@ fn changes(all: &Mission) -> impl Iterator<Item = WindowChange> {
 
 const CHANGES: &[Column<WindowChange>] = columns! {
     "win" I64 |all, one| TableCell::count(all.windows[one.0].index);
-    "start_ns" Time |all, one| begins(all.windows[one.0].span);
-    "end_ns" Time |all, one| ends(all.windows[one.0].span);
-    "length_ns" I64 |all, one| length(all.windows[one.0].span);
+    "start_ns" Time |all, one| TableCell::Time(all.windows[one.0].span.start);
+    "end_ns" Time |all, one| TableCell::Time(all.windows[one.0].span.end);
+    "length_ns" I64 |all, one| TableCell::Int(all.windows[one.0].span.nanos());
     "kind" Text |_, one| TableCell::text(one.1.word());
-    "what" Text |_, one| what(one.1.what);
+    "what" Text |_, one| TableCell::text(one.1.what.word());
     "node" Text |all, one| node(all, one.1.what);
     "topic" Text |all, one| topic(all, one.1.what);
     "time_ns" Time |_, one| time(one.1.time);
@@ -288,30 +289,30 @@ const CHANGES: &[Column<WindowChange>] = columns! {
 
 const EVENTS: &[Column<EventId>] = columns! {
     "id" I64 |_, id| TableCell::count(id.0);
-    "kind" Text |all, id| TableCell::text(event(all, *id).kind.word());
-    "what" Text |all, id| what(event(all, *id).what);
-    "node" Text |all, id| node(all, event(all, *id).what);
-    "topic" Text |all, id| topic(all, event(all, *id).what);
-    "time_ns" Time |all, id| TableCell::Time(event(all, *id).time);
-    "earliest_ns" Time |all, id| TableCell::Time(event(all, *id).earliest);
-    "latest_ns" Time |all, id| TableCell::Time(event(all, *id).latest);
-    "until_ns" Time |all, id| time(event(all, *id).until);
-    "from_hz" F64 |all, id| float(rates(&event(all, *id).detail).0);
-    "to_hz" F64 |all, id| float(rates(&event(all, *id).detail).1);
-    "from_value" Text |all, id| values(all, &event(all, *id).detail).0;
-    "to_value" Text |all, id| values(all, &event(all, *id).detail).1;
-    "degree" Text |all, id| TableCell::text(event(all, *id).confidence.word());
-    "evidence" Text |all, id| words(event(all, *id).evidence.words());
-    "part_of" I64 |all, id| count(event(all, *id).part_of.map(|id| id.0.into()));
-    "is_quiet" FLAG |all, id| TableCell::Flag(event(all, *id).quiet);
-    "weight" I64 |all, id| TableCell::count(event(all, *id).weight);
+    "kind" Text |all, id| TableCell::text(all.log.events[*id].kind.word());
+    "what" Text |all, id| TableCell::text(all.log.events[*id].what.word());
+    "node" Text |all, id| node(all, all.log.events[*id].what);
+    "topic" Text |all, id| topic(all, all.log.events[*id].what);
+    "time_ns" Time |all, id| TableCell::Time(all.log.events[*id].time);
+    "earliest_ns" Time |all, id| TableCell::Time(all.log.events[*id].earliest);
+    "latest_ns" Time |all, id| TableCell::Time(all.log.events[*id].latest);
+    "until_ns" Time |all, id| time(all.log.events[*id].until);
+    "from_hz" F64 |all, id| float(rates(&all.log.events[*id].detail).0);
+    "to_hz" F64 |all, id| float(rates(&all.log.events[*id].detail).1);
+    "from_value" Text |all, id| values(all, &all.log.events[*id].detail).0;
+    "to_value" Text |all, id| values(all, &all.log.events[*id].detail).1;
+    "degree" Text |all, id| TableCell::text(all.log.events[*id].confidence.word());
+    "evidence" Text |all, id| words(all.log.events[*id].evidence.words());
+    "part_of" I64 |all, id| count(all.log.events[*id].part_of.map(|id| id.0.into()));
+    "is_quiet" FLAG |all, id| TableCell::Flag(all.log.events[*id].quiet);
+    "weight" I64 |all, id| TableCell::count(all.log.events[*id].weight);
 };
 
 const PHASES: &[Column<usize>] = columns! {
     "phase" I64 |_, at| TableCell::count(*at);
-    "start_ns" Time |all, at| begins(all.log.phases[*at].span);
-    "end_ns" Time |all, at| ends(all.log.phases[*at].span);
-    "length_ns" I64 |all, at| length(all.log.phases[*at].span);
+    "start_ns" Time |all, at| TableCell::Time(all.log.phases[*at].span.start);
+    "end_ns" Time |all, at| TableCell::Time(all.log.phases[*at].span.end);
+    "length_ns" I64 |all, at| TableCell::Int(all.log.phases[*at].span.nanos());
     "phase_name" Text |all, at| TableCell::text(&*all.log.phases[*at].name);
     "nodes_added" I64 |all, at| TableCell::count(all.log.phases[*at].nodes_added);
     "nodes_removed" I64 |all, at| TableCell::count(all.log.phases[*at].nodes_removed);
@@ -327,10 +328,6 @@ const BAGS: &[Column<usize>] = columns! {
     "is_complete" FLAG |all, at| TableCell::Flag(all.bags[*at].complete);
     "file_bytes" I64 |all, at| TableCell::count(all.bags[*at].file_bytes);
 };
-
-fn event(mission: &Mission, id: EventId) -> &Event {
-    &mission.log.events[id]
-}
 
 fn rates(detail: &Detail) -> (Option<f64>, Option<f64>) {
     match detail {
@@ -350,22 +347,6 @@ fn values<'a>(mission: &Mission, detail: &'a Detail) -> (TableCell<'a>, TableCel
         Detail::Senders { from, to } => (names(from), names(to)),
         Detail::Values { from, to } => (TableCell::text(&**from), TableCell::text(&**to)),
     }
-}
-
-fn begins(span: Span) -> TableCell<'static> {
-    TableCell::Time(span.start)
-}
-
-fn ends(span: Span) -> TableCell<'static> {
-    TableCell::Time(span.end)
-}
-
-fn length(span: Span) -> TableCell<'static> {
-    TableCell::Int(span.nanos())
-}
-
-fn what(what: Element) -> TableCell<'static> {
-    TableCell::text(what.word())
 }
 
 /// The node of an element; unknown for a topic.
@@ -401,7 +382,6 @@ fn time(stamp: Option<Stamp>) -> TableCell<'static> {
 // A folder of tables in progress: hidden until all of them are complete, with few files open at a time.
 
 /// Files that appear together in a folder. Dropped without [`Folder::commit`], they are removed.
-#[derive(Debug)]
 pub(crate) struct Folder {
     path: PathBuf,
     hidden: TempDir,
@@ -413,7 +393,6 @@ pub(crate) struct Folder {
 }
 
 /// Folders created for the files, the outermost first. Those still empty on drop are removed.
-#[derive(Debug)]
 struct Made(Vec<PathBuf>);
 
 impl Drop for Made {
@@ -431,18 +410,15 @@ impl Folder {
     /// # Errors
     /// Where the system refuses.
     pub(crate) fn create(path: &Path) -> Result<Self> {
-        let missing = path
-            .ancestors()
-            .take_while(|f| !f.as_os_str().is_empty() && !f.exists());
+        let missing = path.ancestors();
+        let missing = missing.take_while(|f| !f.as_os_str().is_empty() && !f.exists());
         let mut missing: Vec<PathBuf> = missing.map(Path::to_owned).collect();
         missing.reverse();
         fs::create_dir_all(path).map_err(Error::io("create the folder", path))?;
         let mut builder = tempfile::Builder::new();
-        let hidden = builder
-            .prefix(".bagreel-")
-            .suffix(".part")
-            .tempdir_in(path)
-            .map_err(Error::io("write into", path))?;
+        builder.prefix(".bagreel-").suffix(".part");
+        let hidden = builder.tempdir_in(path);
+        let hidden = hidden.map_err(Error::io("write into", path))?;
         Ok(Self {
             path: path.to_owned(),
             _left: Leftover::at(hidden.path()),
@@ -537,10 +513,9 @@ impl TableFormat {
     /// [`Error::Usage`] if not, with the builds that do.
     pub(crate) fn built(self) -> Result<Self> {
         if self == Self::Parquet && cfg!(not(feature = "parquet")) {
-            return Err(Error::usage(
-                NO_PARQUET,
-                "packages and the Python wheel do, and `cargo install --path . --features parquet`",
-            ));
+            let hint =
+                "packages and the Python wheel do, and `cargo install --path . --features parquet`";
+            return Err(Error::usage(NO_PARQUET, hint));
         }
         Ok(self)
     }

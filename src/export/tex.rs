@@ -19,8 +19,6 @@ pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<
 
 /// The error for `LaTeX` code without a figure.
 pub(crate) fn needs_figure(target: &Target) -> Error {
-    Error::usage(
-        format!("`{}` includes a figure in LaTeX", target.path().display()),
-        "`bagreel figure BAG -o fig.pdf -o fig.tex` draws one",
-    )
+    let what = format!("`{}` includes a figure in LaTeX", target.path().display());
+    Error::usage(what, "`bagreel figure BAG -o fig.pdf -o fig.tex` draws one")
 }

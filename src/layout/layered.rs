@@ -17,8 +17,8 @@ use rayon::prelude::*;
 use super::layers::{Lane, cut, items};
 use super::spacing::{PADDING, Spacing, turned};
 use super::{
-    Component, Engine, Layers, Layout, LayoutOptions, Orientation, PartTask, Plan, Route, pack,
-    routes,
+    Component, Engine, Layers, Layout, LayoutOptions, Orientation, PartTask, Plan, Route, around,
+    pack, routes,
 };
 use crate::base::error::Result;
 use crate::base::geometry::{Point, Rect, Size};
@@ -127,10 +127,7 @@ impl<'a> Draft<'a> {
 }
 
 /// One way of cutting and ordering a part.
-struct Ordering {
-    layers: Layers,
-    order: LayerOrder,
-}
+type Ordering = (Layers, LayerOrder);
 
 /// The drafts of a part, none if it is too large: every way of ranking, with long edges routed outside and
 /// inside of clusters.
@@ -170,13 +167,8 @@ fn orderings(plan: &Plan, part: &Component, options: &LayoutOptions) -> Vec<Orde
     let both = searches.into_par_iter().zip(is_promising);
     let found: Vec<_> = both.map(|(search, is)| is.then(|| last(search))).collect();
     let both = layers.into_iter().zip(found);
-    both.filter_map(|(layers, order)| {
-        Some(Ordering {
-            layers,
-            order: order?,
-        })
-    })
-    .collect()
+    both.filter_map(|(layers, order)| Some((layers, order?)))
+        .collect()
 }
 
 /// The share of the best possible quality below which the search for an order is abandoned. Compared with
@@ -205,16 +197,15 @@ fn promising(
         all.map(|search| bound(task, search.layers, &search.found()))
             .collect()
     });
-    let bounds: Vec<Vec<Bound>> = bounds.collect();
-    let is_useful = bounds
-        .iter()
-        .flatten()
-        .any(|bound| bound.fit >= options.least);
+    let bounds: Vec<Vec<(f64, f64)>> = bounds.collect();
+    let mut all = bounds.iter().flatten();
+    let is_useful = all.any(|(fit, _)| *fit >= options.least);
     let mut promising = vec![false; searches.len()];
     for bounds in bounds {
-        let least = PROMISING * bounds.iter().map(|bound| bound.quality).fold(0.0, f64::max);
-        for (is, bound) in promising.iter_mut().zip(bounds) {
-            *is |= bound.quality >= least;
+        let best = bounds.iter().map(|(_, quality)| *quality);
+        let least = PROMISING * best.fold(0.0, f64::max);
+        for (is, (_, quality)) in promising.iter_mut().zip(bounds) {
+            *is |= quality >= least;
         }
     }
     (promising, is_useful)
@@ -226,22 +217,13 @@ fn orientations(options: &LayoutOptions) -> Vec<Orientation> {
     options.orientation.map_or(both, |asked| vec![asked])
 }
 
-/// Upper bounds for the drawing of a part.
-struct Bound {
-    /// The scale at which it fits the page.
-    fit: f64,
-    quality: f64,
-}
-
-/// The upper bounds for the drawing of a part with this order.
-fn bound(task: PartTask<'_>, layers: &Layers, order: &LayerOrder) -> Bound {
+/// Upper bounds for the drawing of a part with this order: the scale at which it fits the page, and its quality.
+fn bound(task: PartTask<'_>, layers: &Layers, order: &LayerOrder) -> (f64, f64) {
     let room = Spacing::new(task, layers);
     let (size, length) = room.least(&order.rows, &room.apart(&order.rows));
     let size = turned(size, task.orientation);
-    Bound {
-        fit: pack::fit(size, task.options.page),
-        quality: task.quality(size, (order.crossings, length)) * ROUNDING,
-    }
+    let quality = task.quality(size, (order.crossings, length)) * ROUNDING;
+    (pack::fit(size, task.options.page), quality)
 }
 
 /// Ranks for a part: cycles broken in different ways, shallow graphs folded.
@@ -349,7 +331,7 @@ fn best_block(task: PartTask<'_>, orderings: &[Ordering]) -> PlacedPart {
         if next.0 > best.0 { next } else { best }
     };
     // The most promising first: most others can then be rejected before they are placed.
-    let hoped = |way: &Ordering| bound(task, &way.layers, &way.order).quality;
+    let hoped = |(layers, order): &Ordering| bound(task, layers, order).1;
     let mut ways: Vec<(f64, usize)> = orderings.iter().map(hoped).zip(0..).collect();
     ways.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut best: Option<(f64, usize, PlacedPart)> = None;
@@ -375,9 +357,9 @@ fn best_block(task: PartTask<'_>, orderings: &[Ordering]) -> PlacedPart {
     let inside = inside(task, is_long);
     // Orders that only differ in the lanes of edges are cut into the same rows.
     let mut seen = BTreeSet::new();
-    let ways = orderings.iter().filter(|_| is_long);
-    let ways = ways.filter(|way| seen.insert(&way.layers.rank[..way.layers.vertices]));
-    let wraps = ways.flat_map(|way| wrap::wraps(task, &way.layers));
+    let ways = orderings.iter().filter(|_| is_long).map(|way| &way.0);
+    let ways = ways.filter(|layers| seen.insert(&layers.rank[..layers.vertices]));
+    let wraps = ways.flat_map(|layers| wrap::wraps(task, layers));
     let others = inside.into_iter().chain(wraps).map(judged);
     let best = others.fold(best, better);
     // Layers show the way of the data best; blocks are for what does not fit the page in layers.
@@ -387,7 +369,7 @@ fn best_block(task: PartTask<'_>, orderings: &[Ordering]) -> PlacedPart {
     blocks::best(task).into_iter().fold(best, better).1
 }
 
-fn block(task: PartTask<'_>, Ordering { layers, order }: &Ordering) -> PlacedPart {
+fn block(task: PartTask<'_>, (layers, order): &Ordering) -> PlacedPart {
     let room = Spacing::new(task, layers);
     let across = place::place(layers, &order.rows, &room.apart(&order.rows));
     let columns = room.columns(&order.rows, &across);
@@ -395,7 +377,8 @@ fn block(task: PartTask<'_>, Ordering { layers, order }: &Ordering) -> PlacedPar
     placed.crossings = order.crossings;
     placed.clusters = room.frames(&placed.boxes, &across, &columns);
     for (route, chain) in placed.routes.iter_mut().zip(&layers.chains) {
-        route.label = room.label_of(chain, &across, &columns);
+        let bend = chain.iter().find(|item| room.worded.contains_key(item));
+        route.label = bend.map(|bend| room.beside(*bend, &across, &columns));
     }
     placed.on_page(task.orientation)
 }
@@ -430,39 +413,24 @@ impl PlacedPart {
     pub(crate) fn on_page(self, orientation: Orientation) -> Self {
         let reach = Rect::of_points(self.routes.iter().flat_map(Route::points));
         let rects = self.boxes.iter().chain(&self.clusters).copied();
-        let whole = rects
-            .chain(reach)
-            .reduce(|a, b| a.union(&b))
-            .unwrap_or_default();
+        let whole = rects.chain(reach).reduce(|a, b| a.union(&b));
+        let whole = whole.unwrap_or_default();
         let to_page = |p: Point| match orientation {
             Orientation::LeftRight => Point::new(p.x - whole.x, p.y - whole.y),
             Orientation::TopBottom => Point::new(p.y - whole.y, p.x - whole.x),
         };
         let rect = |r: &Rect| {
-            let (corner, size) = (
-                to_page(Point::new(r.x, r.y)),
-                turned(Size::new(r.w, r.h), orientation),
-            );
+            let corner = to_page(Point::new(r.x, r.y));
+            let size = turned(Size::new(r.w, r.h), orientation);
             Rect::new(corner.x, corner.y, size.w, size.h)
         };
         Self {
             size: turned(Size::new(whole.w, whole.h), orientation),
             crossings: self.crossings,
             boxes: self.boxes.iter().map(rect).collect(),
-            routes: self
-                .routes
-                .iter()
-                .map(|route| route.mapped(to_page))
-                .collect(),
+            routes: self.routes.iter().map(|r| r.mapped(to_page)).collect(),
             clusters: self.clusters.iter().map(rect).collect(),
         }
-    }
-
-    /// The block with the places that its labels probably take, so that they do not cover the block next to it.
-    fn with_labels(&self, task: PartTask<'_>) -> Rect {
-        let block = Rect::new(0.0, 0.0, self.size.w, self.size.h);
-        let labels = self.labels(task);
-        labels.fold(block, |all, label| all.union(&label))
     }
 
     /// The places that labels take: where they are placed, else probably above lines to the right and beside lines down.
@@ -507,7 +475,13 @@ pub(crate) fn assembled(
     blocks: &[(PartTask<'_>, PlacedPart)],
     orientation: Orientation,
 ) -> (u64, Layout) {
-    let bounds = blocks.iter().map(|(task, block)| block.with_labels(*task));
+    // With the places that labels probably take, so that they do not cover the block next to it.
+    let bounds = blocks.iter().map(|(task, block)| {
+        let bare = Rect::new(0.0, 0.0, block.size.w, block.size.h);
+        block
+            .labels(*task)
+            .fold(bare, |all, label| all.union(&label))
+    });
     let bounds: Vec<Rect> = bounds.collect();
     let sizes: Vec<Size> = bounds.iter().map(|b| Size::new(b.w, b.h)).collect();
     let (mut corners, mut size) = pack::pack(&sizes, options.page, PART_GAP);
@@ -566,7 +540,7 @@ pub(crate) fn inside(task: PartTask<'_>, is_long: bool) -> Option<PlacedPart> {
     let mut placed = PlacedPart::unplaced(part);
     inner.put(&layout, Point::default(), &mut placed);
     let mut frame = Rect::new(0.0, 0.0, layout.size.w, layout.size.h);
-    for cluster in part.around(root) {
+    for cluster in around(&part.parent, root) {
         frame = plan.clusters[part.clusters[cluster - 1]].frame(frame, PADDING);
         placed.clusters[cluster - 1] = frame;
     }

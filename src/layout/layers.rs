@@ -4,7 +4,7 @@
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
-use crate::layout::{Component, LayerItem, Layers, Plan, first_bend};
+use crate::layout::{Component, LayerItem, Layers, Plan, around, first_bend};
 
 /// The cluster in which a long edge passes a layer, besides the one around both of its ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,13 +38,9 @@ pub(crate) fn cut(plan: &Plan, part: &Component, rank: &[usize], lane: Lane) -> 
         let fork = link.fork.filter(|_| plan.is_labelled);
         let fork = fork.map(|fork| (fork, is_forward));
         let stem = fork.and_then(|fork| stems.get(&fork).copied());
-        let stem = Stem {
-            is_forward,
-            bend: stem,
-        };
         let chain = match rank[from].cmp(&rank[to]) {
-            Ordering::Less => layers.chain((from, to), lane, stem),
-            Ordering::Greater => layers.chain((to, from), lane, stem),
+            Ordering::Less => layers.chain((from, to), lane, is_forward, stem),
+            Ordering::Greater => layers.chain((to, from), lane, is_forward, stem),
             Ordering::Equal => Vec::new(),
         };
         if let (Some(fork), Some(bend)) = (fork, first_bend(&chain, is_forward)) {
@@ -54,14 +50,6 @@ pub(crate) fn cut(plan: &Plan, part: &Component, rank: &[usize], lane: Lane) -> 
     }
     layers.add_borders();
     layers
-}
-
-/// The first bend of the edges of a fork.
-#[derive(Clone, Copy)]
-struct Stem {
-    is_forward: bool,
-    /// The bend, if an earlier edge has it.
-    bend: Option<usize>,
 }
 
 /// The innermost cluster around two clusters, by the one around each.
@@ -79,28 +67,23 @@ pub(crate) fn common(parent: &[usize], mut a: usize, mut b: usize) -> usize {
 
 /// The number of items that the layers would have.
 pub(crate) fn items(part: &Component, rank: &[usize]) -> usize {
-    let bends = part
+    let long = part
         .ends
         .iter()
-        .map(|&(from, to)| rank[from].abs_diff(rank[to]).saturating_sub(1))
-        .sum::<usize>();
-    let borders = spans(part, rank)
-        .iter()
-        .skip(1)
-        .map(|(low, high)| 2 * (high - low + 1))
-        .sum::<usize>();
-    part.vertices.len() + bends + borders
+        .map(|&(from, to)| rank[from].abs_diff(rank[to]));
+    let bends = long.map(|ranks| ranks.saturating_sub(1));
+    let spans = spans(part, rank).into_iter().skip(1);
+    let borders = spans.map(|(low, high)| 2 * (high - low + 1));
+    part.vertices.len() + bends.chain(borders).sum::<usize>()
 }
 
 /// The first and last rank in each cluster.
 fn spans(part: &Component, rank: &[usize]) -> Vec<(usize, usize)> {
     let mut span = vec![(usize::MAX, 0); part.parent.len()];
     for (&home, &rank) in part.home.iter().zip(rank) {
-        let mut cluster = home;
-        while cluster != 0 {
+        for cluster in around(&part.parent, home) {
             let (low, high) = &mut span[cluster];
             (*low, *high) = ((*low).min(rank), (*high).max(rank));
-            cluster = part.parent[cluster];
         }
     }
     span
@@ -128,18 +111,24 @@ impl Layers {
     }
 
     /// Routes an edge from its earlier end to its later one, with a bend in every layer between; returns the
-    /// items it passes. If an earlier edge has the same stem, it runs through that.
-    fn chain(&mut self, (from, to): (usize, usize), lane: Lane, stem: Stem) -> Vec<usize> {
+    /// items it passes. `stem` is the first bend of the edges of its fork, if an earlier one has it: it runs through that.
+    fn chain(
+        &mut self,
+        (from, to): (usize, usize),
+        lane: Lane,
+        is_forward: bool,
+        stem: Option<usize>,
+    ) -> Vec<usize> {
         let shared = common(&self.parent, self.home[from], self.home[to]);
         let ranks = self.rank[from] + 1..self.rank[to];
-        let first = if stem.is_forward {
+        let first = if is_forward {
             ranks.start
         } else {
             ranks.end - 1
         };
         let mut chain = vec![from];
         for rank in ranks {
-            if let Some(bend) = stem.bend.filter(|_| rank == first) {
+            if let Some(bend) = stem.filter(|_| rank == first) {
                 self.link(chain[chain.len() - 1], bend);
                 chain.push(bend);
                 continue;
@@ -160,17 +149,13 @@ impl Layers {
         chain
     }
 
-    /// The innermost cluster around an end, but inside `around`, that spans a layer.
-    fn spanning(&self, end: usize, rank: usize, around: usize) -> Option<usize> {
-        let mut cluster = self.home[end];
-        while cluster != around {
-            let (low, high) = self.span[cluster];
-            if (low..=high).contains(&rank) {
-                return Some(cluster);
-            }
-            cluster = self.parent[cluster];
-        }
-        None
+    /// The innermost cluster around an end, but inside `outer`, that spans a layer.
+    fn spanning(&self, end: usize, rank: usize, outer: usize) -> Option<usize> {
+        let mut inside =
+            around(&self.parent, self.home[end]).take_while(|&cluster| cluster != outer);
+        let spans =
+            |cluster: &usize| self.span[*cluster].0 <= rank && rank <= self.span[*cluster].1;
+        inside.find(spans)
     }
 
     /// Puts a border of each cluster first and last into every layer that it spans.

@@ -41,10 +41,8 @@ impl Engine for LayoutRs {
     fn lay_out(&self, plan: &Plan, options: &LayoutOptions) -> Result<Layout> {
         let hint = "use `--layout layered`, or show fewer elements";
         if plan.vertices.len() > MOST {
-            return Err(Error::usage(
-                format!("layout-rs is too slow for more than {MOST} elements"),
-                hint,
-            ));
+            let what = format!("layout-rs is too slow for more than {MOST} elements");
+            return Err(Error::usage(what, hint));
         }
         let orientation = options.orientation.unwrap_or(Orientation::LeftRight);
         // It checks its preconditions with `assert!`.
@@ -91,10 +89,8 @@ fn lay_out(plan: &Plan, options: &LayoutOptions, orientation: Orientation) -> Re
         Some((task, block(task)?))
     });
     let blocks = blocks.collect::<Option<Vec<_>>>().ok_or_else(|| {
-        Error::usage(
-            "layout-rs placed boxes on top of each other",
-            "use `--layout layered`",
-        )
+        let what = "layout-rs placed boxes on top of each other";
+        Error::usage(what, "use `--layout layered`")
     })?;
     let (_, mut layout) = assembled(&flat, options, &blocks, orientation);
     layout.clusters = vec![Rect::default(); plan.clusters.len()];
@@ -118,17 +114,12 @@ fn block(task: PartTask<'_>) -> Option<PlacedPart> {
     let room = Spacing::new(task, &layers);
     let places = places(&layers, &rows, &room, task.orientation);
     let across: Vec<f64> = places.iter().map(|&(_, across)| across).collect();
-    let columns: Vec<(f64, f64)> = rows
-        .iter()
-        .map(|row| column(row, &layers, &room, &places))
-        .collect();
+    let columns = rows.iter().map(|row| column(row, &layers, &room, &places));
+    let columns: Vec<(f64, f64)> = columns.collect();
     let part = routed(task, &room, &across, &columns);
     let is_clear = |(v, own): (usize, &Rect)| part.boxes[..v].iter().all(|b| !b.overlaps(own));
-    part.boxes
-        .iter()
-        .enumerate()
-        .all(is_clear)
-        .then(|| PlacedPart { crossings, ..part }.on_page(task.orientation))
+    let are_clear = part.boxes.iter().enumerate().all(is_clear);
+    are_clear.then(|| PlacedPart { crossings, ..part }.on_page(task.orientation))
 }
 
 /// The middle of each item: along, across.
@@ -149,32 +140,17 @@ fn places(
         TheirPoint::new(size.w, size.h)
     };
     for item in 0..layers.kind.len() {
-        let vertex = layers.kind[item] == LayerItem::Vertex;
-        let (size, halo) = if vertex {
+        let (flipped, zero) = (direction.flip(), TheirPoint::zero());
+        let (mut element, size, halo) = if layers.kind[item] == LayerItem::Vertex {
             let size = room.size[item];
-            (
-                Size::new(size.w, size.h + 2.0 * room.loop_room(item)),
-                BOX_HALO,
-            )
+            let size = point(Size::new(size.w, size.h + 2.0 * room.loop_room(item)));
+            let (shape, look) = (ShapeKind::new_box(""), StyleAttr::simple());
+            (Element::create(shape, look, flipped, size), size, BOX_HALO)
         } else {
-            (Size::new(1.0, 1.0), EDGE_HALO)
+            let connector = Element::empty_connector(flipped);
+            (connector, point(Size::new(1.0, 1.0)), EDGE_HALO)
         };
-        let mut element = if vertex {
-            Element::create(
-                ShapeKind::new_box(""),
-                StyleAttr::simple(),
-                direction.flip(),
-                point(size),
-            )
-        } else {
-            Element::empty_connector(direction.flip())
-        };
-        element.pos = Position::new(
-            TheirPoint::zero(),
-            point(size),
-            TheirPoint::zero(),
-            point(halo),
-        );
+        element.pos = Position::new(zero, size, zero, point(halo));
         graph.add_node(element);
     }
     for (item, after) in layers.down.iter().enumerate() {
@@ -182,10 +158,10 @@ fn places(
             graph.dag.add_edge(item.into(), next.into());
         }
     }
-    *graph.dag.ranks_mut() = rows
+    let ranks = rows
         .iter()
-        .map(|row| row.iter().map(|&item| item.into()).collect())
-        .collect();
+        .map(|row| row.iter().map(|&item| item.into()).collect());
+    *graph.dag.ranks_mut() = ranks.collect();
     Placer::new(&mut graph).layout(false);
     let middle = |item: usize| {
         let at = graph.pos(item.into()).center();

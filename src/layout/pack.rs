@@ -46,10 +46,8 @@ pub(crate) fn nested(
         let mut best: Option<(f64, Point, Size)> = None;
         let corners = ys.iter();
         for at in corners.flat_map(|y| xs.iter().map(|x| Point::new(*x, *y))) {
-            let size = Size::new(
-                whole.w.max(at.x + sizes[i].w),
-                whole.h.max(at.y + sizes[i].h),
-            );
+            let (right, bottom) = (at.x + sizes[i].w, at.y + sizes[i].h);
+            let size = Size::new(whole.w.max(right), whole.h.max(bottom));
             let scale = fit(size, page);
             if best.as_ref().is_some_and(|best| best.0 >= scale) {
                 continue;
@@ -115,28 +113,20 @@ pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
             continue;
         }
         let inside = packed(&members[c], &sizes, options.page, &mut corners);
-        let width = inside.w.max(cluster.title.w);
-        sizes[n + c] = Size::new(
-            width + 2.0 * PADDING,
-            inside.h + cluster.title.h + 2.0 * PADDING,
-        );
+        let (width, height) = (inside.w.max(cluster.title.w), inside.h + cluster.title.h);
+        sizes[n + c] = Size::new(width + 2.0 * PADDING, height + 2.0 * PADDING);
         members[cluster.parent.unwrap_or(k)].push(n + c);
     }
     let size = packed(&members[k], &sizes, options.page, &mut corners);
     for (c, cluster) in plan.clusters.iter().enumerate() {
-        let corner = Point::new(
-            corners[n + c].x + PADDING,
-            corners[n + c].y + cluster.title.h + PADDING,
-        );
+        let Point { x, y } = corners[n + c];
+        let (x, y) = (x + PADDING, y + cluster.title.h + PADDING);
         for &member in &members[c] {
-            corners[member] =
-                Point::new(corners[member].x + corner.x, corners[member].y + corner.y);
+            corners[member] = Point::new(corners[member].x + x, corners[member].y + y);
         }
     }
-    let rects = corners
-        .iter()
-        .zip(&sizes)
-        .map(|(at, size)| Rect::new(at.x, at.y, size.w, size.h));
+    let rects = corners.iter().zip(&sizes);
+    let rects = rects.map(|(at, size)| Rect::new(at.x, at.y, size.w, size.h));
     let mut boxes: Vec<Rect> = rects.collect();
     let clusters = boxes.split_off(n);
     let (routes, _) = around::routes(plan, &boxes);

@@ -19,7 +19,9 @@ pub(crate) fn kept(plan: &Plan, known: &[Option<Rect>], orientation: Orientation
         boxes: vec![None; plan.vertices.len()],
     };
     for (v, vertex) in plan.vertices.iter().enumerate() {
-        let old = known.get(v).copied().flatten().filter(is_sane);
+        let is_sane = |length: f64| length.is_finite() && (0.0..=1e7).contains(&length);
+        let old = known.get(v).copied().flatten();
+        let old = old.filter(|r| [r.x, r.y, r.w, r.h].into_iter().all(is_sane));
         // It may have grown for its lines.
         let size = |old: Rect| Size::new(vertex.size.w.max(old.w), vertex.size.h.max(old.h));
         let place = old.map(|old| Rect::around(old.centre(), size(old)));
@@ -39,10 +41,8 @@ pub(crate) fn kept(plan: &Plan, known: &[Option<Rect>], orientation: Orientation
     let clusters = table.frames();
     let boxes = table.boxes.into_iter();
     let boxes: Vec<Rect> = boxes.map(Option::unwrap_or_default).collect();
-    let whole = boxes
-        .iter()
-        .chain(&clusters)
-        .fold(Rect::default(), |all, rect| all.union(rect));
+    let all = boxes.iter().chain(&clusters);
+    let whole = all.fold(Rect::default(), |all, rect| all.union(rect));
     Layout {
         orientation,
         size: Size::new(whole.right(), whole.bottom()),
@@ -51,12 +51,6 @@ pub(crate) fn kept(plan: &Plan, known: &[Option<Rect>], orientation: Orientation
         clusters,
         remarks: Vec::new(),
     }
-}
-
-fn is_sane(rect: &Rect) -> bool {
-    [rect.x, rect.y, rect.w, rect.h]
-        .iter()
-        .all(|length| length.is_finite() && (0.0..=1e7).contains(length))
 }
 
 /// The boxes placed so far.
@@ -68,29 +62,18 @@ struct PinnedBoxes<'a> {
 impl PinnedBoxes<'_> {
     fn is_free(&self, place: &Rect, gap: f64) -> bool {
         let place = place.grown(gap);
-        !self
-            .boxes
-            .iter()
-            .flatten()
-            .any(|other| other.overlaps(&place))
+        let mut others = self.boxes.iter().flatten();
+        !others.any(|other| other.overlaps(&place))
     }
 
     /// A free position near the neighbours, or else near the cluster, or else below everything.
     fn place_for(&mut self, v: usize, neighbours: &[usize]) -> Rect {
         let size = self.plan.vertices[v].size;
-        let below = self
-            .boxes
-            .iter()
-            .flatten()
-            .map(Rect::bottom)
-            .fold(0.0, f64::max)
-            + 3.0 * GAP;
+        let bottoms = self.boxes.iter().flatten().map(Rect::bottom);
+        let below = bottoms.fold(0.0, f64::max) + 3.0 * GAP;
         let last = Rect::new(PADDING, below, size.w, size.h);
-        let mut near: Vec<Point> = neighbours
-            .iter()
-            .filter_map(|&u| self.boxes[u])
-            .map(|rect| rect.centre())
-            .collect();
+        let near = neighbours.iter().filter_map(|&u| self.boxes[u]);
+        let mut near: Vec<Point> = near.map(|rect| rect.centre()).collect();
         if let Some(cluster) = self.plan.vertices[v].cluster {
             let frame = self.frames()[cluster];
             if frame.w > 0.0 {
@@ -106,11 +89,8 @@ impl PinnedBoxes<'_> {
         });
         for ring in 0..RINGS {
             for (x, y) in around(ring) {
-                let middle = Point::new(
-                    goal.x + f64::from(x) * STEP.w,
-                    goal.y + f64::from(y) * STEP.h,
-                );
-                let place = Rect::around(middle, size);
+                let (x, y) = (f64::from(x) * STEP.w, f64::from(y) * STEP.h);
+                let place = Rect::around(Point::new(goal.x + x, goal.y + y), size);
                 let inside = place.x >= PADDING && place.y >= PADDING;
                 if inside && self.is_free(&place, GAP) && self.keeps_clusters(v, place) {
                     return place;
@@ -179,10 +159,9 @@ impl PinnedBoxes<'_> {
 
 /// The steps on the border of a square, nearest to its axes first.
 fn around(ring: i32) -> Vec<(i32, i32)> {
-    let mut steps: Vec<(i32, i32)> = (-ring..=ring)
-        .flat_map(|x| (-ring..=ring).map(move |y| (x, y)))
-        .filter(|(x, y)| x.abs().max(y.abs()) == ring)
-        .collect();
+    let square = (-ring..=ring).flat_map(|x| (-ring..=ring).map(move |y| (x, y)));
+    let border = square.filter(|(x, y)| x.abs().max(y.abs()) == ring);
+    let mut steps: Vec<(i32, i32)> = border.collect();
     steps.sort_by_key(|(x, y)| (x.abs() + y.abs(), -x, -y));
     steps
 }

@@ -65,11 +65,7 @@ impl RoutingPlane<'_> {
             Point::new(centre.x + half, top),
             end,
         ];
-        Route {
-            start: Point::new(centre.x - half, foot),
-            curves: vec![curve],
-            label: None,
-        }
+        Route::new(Point::new(centre.x - half, foot), vec![curve])
     }
 
     /// The reach of a vertex's outline across from its middle, at a distance along.
@@ -152,13 +148,9 @@ struct RoutePen {
 impl RoutePen {
     fn at(x: f64, y: f64) -> Self {
         let at = Point::new(x, y);
-        let route = Route {
-            start: at,
-            ..Route::default()
-        };
         Self {
             at,
-            route,
+            route: Route::new(at, Vec::new()),
             is_level: false,
         }
     }
@@ -171,11 +163,8 @@ impl RoutePen {
         if self.is_level {
             self.route.curves.pop();
         }
-        let from = self
-            .route
-            .curves
-            .last()
-            .map_or(self.route.start, |curve| curve[2]);
+        let last = self.route.curves.last();
+        let from = last.map_or(self.route.start, |curve| curve[2]);
         let to = Point::new(x, self.at.y);
         let third = (to.x - from.x) / 3.0;
         self.route.curves.push([

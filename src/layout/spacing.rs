@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use crate::base::geometry::{Point, Rect, Size};
 use crate::layout::routes::{PORT_STEP, PORTS};
 use crate::layout::{
-    LayerItem, LayerRows, Layers, Link, Orientation, PartTask, Plan, first_bend, include,
+    LayerItem, LayerRows, Layers, Link, Orientation, PartTask, Plan, around, first_bend, include,
 };
 
 /// The space between boxes side by side, and between edges side by side and an edge and anything else: the heads
@@ -63,7 +63,7 @@ pub(crate) struct Spacing<'a> {
     /// The longest label, along the edges, between a layer and the next.
     label: Vec<f64>,
     /// The size of the label beside each bend, if there is one.
-    worded: BTreeMap<usize, Size>,
+    pub(crate) worded: BTreeMap<usize, Size>,
     /// The size of each cluster's title; the first is that of the outside.
     title: Vec<Size>,
     /// The space for the words at the end of each cluster: along, across.
@@ -137,10 +137,10 @@ impl<'a> Spacing<'a> {
         let distance = |pair: &[usize]| {
             self.reach(pair[0], true) + self.reach(pair[1], false) + self.gap(pair[0], pair[1])
         };
-        let mut apart: Vec<Vec<f64>> = rows
+        let apart = rows
             .iter()
-            .map(|row| row.windows(2).map(distance).collect())
-            .collect();
+            .map(|row| row.windows(2).map(distance).collect());
+        let mut apart: Vec<Vec<f64>> = apart.collect();
         for cluster in (1..self.layers.parent.len()).rev() {
             let rank = self.layers.span[cluster].0;
             self.widen_for_title(cluster, &rows[rank], &mut apart[rank]);
@@ -166,19 +166,8 @@ impl<'a> Spacing<'a> {
         self.orientation == Orientation::TopBottom
     }
 
-    /// The middle of the label of an edge, if it has reserved space.
-    pub(crate) fn label_of(
-        &self,
-        chain: &[usize],
-        across: &[f64],
-        columns: &[(f64, f64)],
-    ) -> Option<Point> {
-        let bend = chain.iter().find(|item| self.worded.contains_key(item))?;
-        Some(self.beside(*bend, across, columns))
-    }
-
     /// The middle of the label beside a bend.
-    fn beside(&self, bend: usize, across: &[f64], columns: &[(f64, f64)]) -> Point {
+    pub(crate) fn beside(&self, bend: usize, across: &[f64], columns: &[(f64, f64)]) -> Point {
         let (start, end) = columns[self.layers.rank[bend]];
         let (aside, is_onwards) = (self.worded[&bend].h / 2.0 + ASIDE, self.is_label_onwards());
         let aside = if is_onwards { aside } else { -aside };
@@ -212,7 +201,12 @@ impl<'a> Spacing<'a> {
     pub(crate) fn columns(&self, rows: &LayerRows, across: &[f64]) -> Vec<(f64, f64)> {
         let gaps = self.gaps(rows, |v, u| (across[v] - across[u]).abs());
         let mut width = self.widths();
-        self.widen_for_titles(&mut width, &gaps);
+        // The last layer of a cluster is wide enough for a title that runs along.
+        for cluster in 1..self.layers.parent.len() {
+            let (low, high) = self.layers.span[cluster];
+            let own = width[low..=high].iter().sum::<f64>() + gaps[low..high].iter().sum::<f64>();
+            width[high] += (self.title[cluster].w - own).max(0.0);
+        }
         self.lined_up(&width, &gaps)
     }
 
@@ -268,15 +262,6 @@ impl<'a> Spacing<'a> {
         width
     }
 
-    /// Makes the last layer of a cluster wide enough for a title that runs along.
-    fn widen_for_titles(&self, width: &mut [f64], gaps: &[f64]) {
-        for cluster in 1..self.layers.parent.len() {
-            let (low, high) = self.layers.span[cluster];
-            let own = width[low..=high].iter().sum::<f64>() + gaps[low..high].iter().sum::<f64>();
-            width[high] += (self.title[cluster].w - own).max(0.0);
-        }
-    }
-
     /// The space that borders of clusters need before and after every layer.
     fn depths(&self) -> Vec<(f64, f64)> {
         let mut depth = vec![(0.0_f64, 0.0_f64); self.layers.ranks];
@@ -292,8 +277,7 @@ impl<'a> Spacing<'a> {
     /// The space that the borders from `cluster` outwards need before and after a layer.
     fn depth(&self, cluster: usize, rank: usize) -> (f64, f64) {
         let (mut before, mut after) = (0.0, 0.0);
-        let mut cluster = cluster;
-        while cluster != 0 {
+        for cluster in around(&self.layers.parent, cluster) {
             let (low, high) = self.layers.span[cluster];
             if low == rank {
                 before += self.lead(cluster);
@@ -301,7 +285,6 @@ impl<'a> Spacing<'a> {
             if high == rank {
                 after += PADDING + self.footer[cluster].0;
             }
-            cluster = self.layers.parent[cluster];
         }
         (before, after)
     }
@@ -325,10 +308,9 @@ impl<'a> Spacing<'a> {
     /// The space that edges need to bend after a row: more for many and for steep ones.
     fn bending_room(&self, row: &[usize], rise: impl Fn(usize, usize) -> f64) -> f64 {
         let (mut edges, mut steepest) = (0.0, 0.0_f64);
-        for &v in row
-            .iter()
-            .filter(|&&v| matches!(self.layers.kind[v], LayerItem::Vertex | LayerItem::Bend))
-        {
+        let is_edge =
+            |v: &&usize| matches!(self.layers.kind[**v], LayerItem::Vertex | LayerItem::Bend);
+        for &v in row.iter().filter(is_edge) {
             for &u in &self.layers.down[v] {
                 edges += 1.0;
                 steepest = steepest.max(rise(v, u));
@@ -380,12 +362,11 @@ impl<'a> Spacing<'a> {
             (self.layers.borders[cluster], self.layers.span[cluster]);
         let (lead, head) = (self.lead(cluster), self.headroom(cluster));
         let (tail, foot) = self.footer[cluster];
-        let mut frame = Rect::new(
-            content.x - lead,
-            content.y - head,
+        let (w, h) = (
             content.w + lead + PADDING + tail,
             content.h + head + PADDING + foot,
         );
+        let mut frame = Rect::new(content.x - lead, content.y - head, w, h);
         // A longer title may need the space up to the borders.
         let wanted = self.title[cluster];
         let room = (columns[low].0 - lead, columns[high].1 + PADDING + tail);

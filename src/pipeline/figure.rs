@@ -9,7 +9,7 @@ use crate::base::name::last_part;
 use crate::base::time::Stamp;
 use crate::base::words;
 use crate::draw::figure::steps::{self, StepPanel, graph_width};
-use crate::draw::figure::{self, Figure, FigureKind, FigureSheet, Latex, nothing};
+use crate::draw::figure::{self, FigureKind, FigureSheet, Latex, nothing};
 use crate::draw::picture::PageOptions;
 use crate::draw::scene::Scene;
 use crate::draw::timeline::FigureSource;
@@ -36,7 +36,7 @@ const HIGH: f64 = 0.5;
 /// The shapes of a panel's graph that are tried, height over width, the lowest first.
 const SHAPES: [f64; 5] = [0.3, 0.5, 0.8, 1.3, 2.0];
 
-/// The figure and its LaTeX code.
+/// The figure, whose size is that on paper, remarks for the user, and its LaTeX code.
 ///
 /// # Errors
 /// [`Error::Usage`] if nothing is left to draw, or if it does not fit; the hint suggests what would.
@@ -46,7 +46,7 @@ pub(super) fn draw(
     options: &FigureOptions,
     outputs: &[Output],
     watch: &mut dyn Watch,
-) -> Result<(Figure, Latex)> {
+) -> Result<(Scene, Vec<String>, Latex)> {
     let filters = (&drawing.view.ns_filter, &drawing.view.topic_filter);
     let source = FigureSource::new(mission, filters.0, filters.1, options.is_named);
     let sheet = FigureSheet::new(&source, &drawing.fonts, options);
@@ -56,7 +56,6 @@ pub(super) fn draw(
         FigureKind::Holders => (figure::holders(&sheet)?, Vec::new()),
         FigureKind::Steps => (of_steps(&sheet, drawing)?, Vec::new()),
     };
-    let drawn = figure::finished(&source, options, scene, remarks);
     let is_included = |o: &&Output| ["pdf", "png", "svg"].contains(&o.format.word);
     let picture = match outputs.iter().find(is_included) {
         Some(output) => output.target.path().to_owned(),
@@ -71,10 +70,10 @@ pub(super) fn draw(
     }
     let latex = Latex {
         picture,
-        caption: drawn.caption.clone(),
+        caption: figure::caption(&source, options, &remarks),
         is_wide: options.width_mm > 120.0,
     };
-    Ok((drawn, latex))
+    Ok((scene, remarks, latex))
 }
 
 /// The drawing of a figure: on paper, with one line per pair of nodes.

@@ -466,11 +466,14 @@ impl<'a> Showing<'a> {
             ..self.job.sequence.figure.clone().unwrap_or_default()
         };
         let (mission, drawing) = (self.mission, &self.job.drawing);
-        let (figure, latex) = figure::draw(mission, drawing, &options, &self.outputs, watch)?;
-        figure.remarks.iter().for_each(|text| self.remark(text));
+        let (scene, remarks, latex) =
+            figure::draw(mission, drawing, &options, &self.outputs, watch)?;
+        for text in &remarks {
+            self.remark(text);
+        }
         let view = View::default();
         let sequence = Sequence {
-            strip: Some(&figure.scene),
+            strip: Some(&scene),
             latex: Some(&latex),
             ..self.sequence(&view)
         };

@@ -4,12 +4,14 @@ use super::Drawing;
 use super::compose::Composed;
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
+use crate::draw::picture::Union;
 use crate::draw::picture::spaces::MOST_LISTED;
 use crate::draw::picture::{PageOptions, Picture};
 use crate::draw::scene::Scene;
+use crate::draw::style::Style;
 use crate::draw::timeline::Timeline;
 use crate::export::Output;
-use crate::export::sequence::{Drawings, UnionDrawings};
+use crate::export::sequence::Drawings;
 use crate::mission::Mission;
 use crate::view::{AlsoHere, DrawnPart, View, drawn_part};
 
@@ -98,15 +100,12 @@ impl Drawings for OpenedDrawings<'_> {
         self.picture.scene(window)
     }
 
-    fn graph(&self) -> Option<UnionDrawings<'_>> {
-        let drawings = self.picture.graph()?;
+    fn graph(&self) -> Option<(Union, &Style)> {
         let Opened { part, whole, .. } = self.opened;
-        Some(match part {
-            Some(part) => UnionDrawings {
-                union: self.picture.union_with_words(&whole.view, part),
-                ..drawings
-            },
-            None => drawings,
-        })
+        let union = match part {
+            Some(part) => self.picture.union_with_words(&whole.view, part),
+            None => self.picture.union(),
+        };
+        Some((union, self.picture.style()))
     }
 }

@@ -60,10 +60,8 @@ fn shared<'a>(mission: &'a Mission, viewed: &Viewed<'_>) -> Vec<(Stamp, TopicId,
             continue;
         };
         for pair in rates.holders(id).windows(2) {
-            let times = pair[0]
-                .times
-                .iter()
-                .flat_map(|a| pair[1].times.iter().map(move |b| (a, b)));
+            let times = pair[0].times.iter();
+            let times = times.flat_map(|a| pair[1].times.iter().map(move |b| (a, b)));
             let mut both = times.filter(|(a, b)| a.shared(**b) > OVERLAP_NS);
             let since = both.next().map(|(a, b)| a.start.max(b.start));
             let since = since.filter(|since| *since > begun);
@@ -203,12 +201,9 @@ impl<'a> CaptionWriter<'a> {
             return None;
         };
         let (topic, nodes) = self.audience(node)?;
-        let names: Vec<String> = nodes
-            .iter()
-            .map(|id| Element::Node(*id))
-            .filter(|node| self.viewed.sees(*node) && after.has(*node))
-            .map(|node| self.name(node))
-            .collect();
+        let nodes = nodes.iter().map(|id| Element::Node(*id));
+        let seen = nodes.filter(|node| self.viewed.sees(*node) && after.has(*node));
+        let names: Vec<String> = seen.map(|node| self.name(node)).collect();
         let gets = match names.len() {
             0 => return None,
             1 => "gets",
@@ -310,12 +305,10 @@ impl<'a> CaptionWriter<'a> {
             _ => (2, '−', "ends", "no longer "),
         };
         let name = self.name(headline.what);
-        match self.subject_of_edge(headline.what, not) {
-            None => Said::new(rank, sign, name, verb),
-            Some(lead) => Said {
-                lead,
-                ..Said::new(rank, sign, name, "")
-            },
+        let lead = self.subject_of_edge(headline.what, not);
+        Said {
+            lead: lead.clone().unwrap_or_default(),
+            ..Said::new(rank, sign, name, lead.map_or(verb, |_| ""))
         }
     }
 

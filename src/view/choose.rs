@@ -49,7 +49,9 @@ pub(crate) fn select(elements: &Elements, options: &ViewOptions) -> Selection {
         let (from, to) = (&wiring.publishers[id], &wiring.subscribers[id]);
         let (publishers, subscribers) = (others(from), others(to));
         let connected = publishers + subscribers;
-        let is_recorded = connected == 0 && !(from.is_empty() && to.is_empty());
+        // Only they subscribe to it, and it has no message.
+        let is_silent = !topic.seen.evidence.has("connection");
+        let is_recorded = connected == 0 && !(from.is_empty() && to.is_empty()) && is_silent;
         let reasons = [
             (Reason::TopicFilter, !options.topic_filter.passes(name)),
             (Reason::Dead, hide.dead && subscribers == 0),
@@ -58,11 +60,7 @@ pub(crate) fn select(elements: &Elements, options: &ViewOptions) -> Selection {
             (Reason::Params, hide.params && is_params(name, exists)),
             (Reason::Quiet, hide.quiet && is_quiet(name)),
             (Reason::Services, hide.services && topic.is_service()),
-            // Only they subscribe to it, and it has no message.
-            (
-                Reason::Recorder,
-                is_recorded && !topic.seen.evidence.has("connection"),
-            ),
+            (Reason::Recorder, is_recorded),
         ];
         let reason = reasons.into_iter().find(|(_, is_one)| *is_one);
         reason.map(|(reason, _)| reason)
@@ -85,10 +83,8 @@ pub(crate) fn finish(
     let wiring = elements.wiring(|_, _| true);
     let hides_debug = options.hide.debug && !options.mode.is_direct();
     for (id, topic) in elements.topics.with_ids().filter(|(id, _)| !grouped[*id]) {
-        let mut ends = wiring.publishers[id]
-            .iter()
-            .chain(&wiring.subscribers[id])
-            .peekable();
+        let (from, to) = (&wiring.publishers[id], &wiring.subscribers[id]);
+        let mut ends = from.iter().chain(to).peekable();
         let is_outside = |node: &NodeId| selection.nodes[*node] == Some(Reason::NsFilter);
         let reason = &mut selection.topics[id];
         if ends.peek().is_some() && ends.all(is_outside) {

@@ -130,10 +130,8 @@ impl Keep {
     }
 
     fn graph(&self, graph: &Graph, options: &ViewOptions, viewed: &Viewed<'_>) -> Graph {
-        let is_shown = |state: &ElementState| match state.what {
-            Element::Node(_) => shows_node(state.state, options),
-            Element::Topic(_) | Element::Publish(_) | Element::Subscribe(_) => true,
-        };
+        let is_shown =
+            |state: &ElementState| !state.what.is_node() || shows_node(state.state, options);
         let is_there = |what: Element| graph.get(what).is_some_and(is_shown);
         let states = graph.states.iter().filter_map(|state| {
             let (node, topic) = viewed.elements.ends(state.what);

@@ -34,108 +34,97 @@ pub(crate) struct ItemKey {
 pub(crate) type Keys = PerElement<Option<ItemKey>>;
 
 /// An element that moves to the box of others.
-pub(crate) struct Fold {
-    pub(crate) what: Element,
-    pub(crate) key: ItemKey,
-}
+pub(crate) type Fold = (Element, ItemKey);
 
-/// What determines the boxes.
-pub(crate) struct Boxes<'a> {
-    pub(crate) elements: &'a Elements,
-    pub(crate) options: &'a ViewOptions,
-    pub(crate) fleets: &'a Fleets,
-    pub(crate) selection: &'a Selection,
-    pub(crate) groups: &'a Groups,
-}
-
-impl Boxes<'_> {
-    /// The box of each node and topic: its own, unless one of the rules moves it to that of others.
-    pub(crate) fn keys(&self) -> Keys {
-        let is_direct = self.options.mode.is_direct();
-        let mut keys = self.own();
-        if !self.options.exact_names {
-            apply(&mut keys, runs_of_roles(self.elements));
-        }
-        if !is_direct {
-            let folds = grouped_topics(self.groups, &keys);
-            apply(&mut keys, folds);
-        }
-        let mut folds = self.fleets.folds(&keys);
-        folds.retain(|fold| fold.what.is_node() || !is_direct);
+/// The box of each node and topic: its own, unless one of the rules moves it to that of others.
+pub(crate) fn keys(
+    elements: &Elements,
+    options: &ViewOptions,
+    fleets: &Fleets,
+    selection: &Selection,
+    groups: &Groups,
+) -> Keys {
+    let is_direct = options.mode.is_direct();
+    let mut keys = own(elements, selection);
+    if !options.exact_names {
+        apply(&mut keys, runs_of_roles(elements));
+    }
+    if !is_direct {
+        let folds = grouped_topics(groups, &keys);
         apply(&mut keys, folds);
-        if !self.options.alike_in.is_empty() {
-            let folds = alike_nodes(self.elements, &self.options.alike_in, &keys);
-            apply(&mut keys, folds);
-        }
-        let folds = self.collapsed(&keys);
+    }
+    let mut folds = fleets.folds(&keys);
+    folds.retain(|(what, _)| what.is_node() || !is_direct);
+    apply(&mut keys, folds);
+    if !options.alike_in.is_empty() {
+        let folds = alike_nodes(elements, &options.alike_in, &keys);
         apply(&mut keys, folds);
-        if is_direct {
-            let is_inside =
-                |key: &ItemKey| self.options.is_bundled && key.kind == ItemKind::Namespace;
-            for id in self.elements.topics.ids() {
-                if let Some(key) = keys.of_mut(Element::Topic(id)) {
-                    *key = key.take().filter(is_inside);
-                }
+    }
+    let folds = collapsed(elements, options, &keys);
+    apply(&mut keys, folds);
+    if is_direct {
+        let is_inside = |key: &ItemKey| options.is_bundled && key.kind == ItemKind::Namespace;
+        for id in elements.topics.ids() {
+            if let Some(key) = keys.of_mut(Element::Topic(id)) {
+                *key = key.take().filter(is_inside);
             }
         }
-        keys
     }
+    keys
+}
 
-    /// A box for each chosen element.
-    fn own(&self) -> Keys {
-        PerElement::new(self.elements, |what| {
-            let (kind, name) = match what {
-                Element::Node(id) if self.selection.nodes[id].is_none() => {
-                    (ItemKind::Node, self.elements.nodes[id].name.shared())
-                }
-                Element::Topic(id) if self.selection.topics[id].is_none() => {
-                    (ItemKind::Topic, self.elements.topics[id].name.shared())
-                }
-                _ => return None,
-            };
-            Some(ItemKey { kind, name })
-        })
-    }
-
-    /// The elements inside collapsed namespaces, except those with a single box.
-    fn collapsed(&self, keys: &Keys) -> Vec<Fold> {
-        let is_direct = self.options.mode.is_direct();
-        let mut collapse = Collapse::new(self.options);
-        if collapse.is_empty() {
-            return Vec::new();
-        }
-        let nodes = self.elements.nodes.ids();
-        let nodes = nodes.filter_map(|id| of(keys, Element::Node(id)));
-        let topics = self.elements.topics.iter().filter(|_| !is_direct);
-        collapse.open_single(
-            &nodes.map(|key| &*key.name).collect(),
-            &topics.map(|topic| topic.name.as_str()).collect(),
-        );
-        // Of each box of topics, the namespaces of its publishers and of its subscribers.
-        let mut ends: BTreeMap<&ItemKey, [Vec<Option<&str>>; 2]> = BTreeMap::new();
-        for (what, edge) in self.elements.edges() {
-            let (node, topic) = (Element::Node(edge.node), Element::Topic(edge.topic));
-            if let (Some(node), Some(topic)) = (of(keys, node), of(keys, topic)) {
-                let way = usize::from(matches!(what, Element::Subscribe(_)));
-                ends.entry(topic).or_default()[way].push(collapse.of(&node.name));
+/// A box for each chosen element.
+fn own(elements: &Elements, selection: &Selection) -> Keys {
+    PerElement::new(elements, |what| {
+        let (kind, name) = match what {
+            Element::Node(id) if selection.nodes[id].is_none() => {
+                (ItemKind::Node, elements.nodes[id].name.shared())
             }
-        }
-        let fold = |(what, key): (Element, &Option<ItemKey>)| {
-            let key = key.as_ref()?;
-            let own = collapse.of(&key.name);
-            let [publishers, subscribers] =
-                (ends.get(key)).map_or([&[][..]; 2], |[p, s]| [&p[..], &s[..]]);
-            let space = match what {
-                Element::Node(_) => own,
-                _ if is_direct => sent_from(own, publishers),
-                _ => swallows(own, publishers, subscribers).filter(|_| !collapse.keeps(&key.name)),
-            };
-            let (kind, name) = (ItemKind::Namespace, space?.into());
-            let key = ItemKey { kind, name };
-            Some(Fold { what, key })
+            Element::Topic(id) if selection.topics[id].is_none() => {
+                (ItemKind::Topic, elements.topics[id].name.shared())
+            }
+            _ => return None,
         };
-        keys.iter().filter_map(fold).collect()
+        Some(ItemKey { kind, name })
+    })
+}
+
+/// The elements inside collapsed namespaces, except those with a single box.
+fn collapsed(elements: &Elements, options: &ViewOptions, keys: &Keys) -> Vec<Fold> {
+    let is_direct = options.mode.is_direct();
+    let mut collapse = Collapse::new(options);
+    if collapse.collapse.is_empty() {
+        return Vec::new();
     }
+    let nodes = elements.nodes.ids();
+    let nodes = nodes.filter_map(|id| of(keys, Element::Node(id)));
+    let topics = elements.topics.iter().filter(|_| !is_direct);
+    let topics = topics.map(|topic| topic.name.as_str());
+    collapse.open_single(&nodes.map(|key| &*key.name).collect(), &topics.collect());
+    // Of each box of topics, the namespaces of its publishers and of its subscribers.
+    let mut ends: BTreeMap<&ItemKey, [Vec<Option<&str>>; 2]> = BTreeMap::new();
+    for (what, edge) in elements.edges() {
+        let (node, topic) = (Element::Node(edge.node), Element::Topic(edge.topic));
+        if let (Some(node), Some(topic)) = (of(keys, node), of(keys, topic)) {
+            let way = usize::from(matches!(what, Element::Subscribe(_)));
+            ends.entry(topic).or_default()[way].push(collapse.of(&node.name));
+        }
+    }
+    let fold = |(what, key): (Element, &Option<ItemKey>)| {
+        let key = key.as_ref()?;
+        let own = collapse.of(&key.name);
+        let [publishers, subscribers] =
+            (ends.get(key)).map_or([&[][..]; 2], |[p, s]| [&p[..], &s[..]]);
+        let is_open = || collapse.expand.contains(&*key.name);
+        let space = match what {
+            Element::Node(_) => own,
+            _ if is_direct => sent_from(own, publishers),
+            _ => swallows(own, publishers, subscribers).filter(|_| !is_open()),
+        };
+        let (kind, name) = (ItemKind::Namespace, space?.into());
+        Some((what, ItemKey { kind, name }))
+    };
+    keys.iter().filter_map(fold).collect()
 }
 
 /// The box of an element, if it has one.
@@ -145,16 +134,11 @@ pub(crate) fn of(keys: &Keys, what: Element) -> Option<&ItemKey> {
 
 /// Moves elements that have a box to those of others.
 fn apply(keys: &mut Keys, folds: Vec<Fold>) {
-    for fold in folds {
-        if let Some(Some(key)) = keys.of_mut(fold.what) {
-            *key = fold.key;
+    for (what, new) in folds {
+        if let Some(Some(key)) = keys.of_mut(what) {
+            *key = new;
         }
     }
-}
-
-/// The different names of these boxes.
-fn names<'a>(keys: impl Iterator<Item = &'a ItemKey>) -> BTreeSet<Arc<str>> {
-    keys.map(|key| Arc::clone(&key.name)).collect()
 }
 
 // Topics that are drawn as one box: actions, service events, image transports, the transform tree.
@@ -178,7 +162,10 @@ pub(crate) fn groups(elements: &Elements, seen: &ById<TopicId, bool>, wish: Grou
     let mut groups = Groups::new();
     if wish.actions {
         take(&mut free, &mut groups, 5, |_, name| action(name));
-        take(&mut free, &mut groups, 2, |_, name| action_of_ros2(name));
+        // `X/_action/feedback`, `X/_action/status` and the events of its hidden services.
+        let of_ros2 =
+            |name: &str| Some(name.split_once("/_action/")?.0.to_owned() + "/action_topics");
+        take(&mut free, &mut groups, 2, |_, name| of_ros2(name));
         take(&mut free, &mut groups, 2, |_, name| service_events(name));
     }
     if wish.images {
@@ -214,12 +201,6 @@ fn action(topic: &str) -> Option<String> {
     Some(format!("{action}/action_topics"))
 }
 
-/// The group of `X/_action/feedback`, `X/_action/status` and the events of its hidden services.
-fn action_of_ros2(topic: &str) -> Option<String> {
-    let (action, _) = topic.split_once("/_action/")?;
-    Some(format!("{action}/action_topics"))
-}
-
 /// The group of the event topics of the services of one namespace, which is usually a node's name.
 fn service_events(topic: &str) -> Option<String> {
     let service = topic.strip_suffix("/_service_event")?;
@@ -243,7 +224,8 @@ fn grouped_topics(groups: &Groups, keys: &Keys) -> Vec<Fold> {
     let others = keys
         .iter()
         .filter(|(what, _)| what.is_topic() && !grouped.contains(what));
-    let mut taken = names(others.filter_map(|(_, key)| key.as_ref()));
+    let taken = others.filter_map(|(_, key)| Some(Arc::clone(&key.as_ref()?.name)));
+    let mut taken: BTreeSet<Arc<str>> = taken.collect();
     let mut folds = Vec::new();
     for (name, ids) in groups {
         let mut name = name.clone();
@@ -253,10 +235,7 @@ fn grouped_topics(groups: &Groups, keys: &Keys) -> Vec<Fold> {
         let (kind, name): (_, Arc<str>) = (ItemKind::Group, name.into());
         taken.insert(Arc::clone(&name));
         let key = ItemKey { kind, name };
-        folds.extend(ids.iter().map(|id| Fold {
-            what: Element::Topic(*id),
-            key: key.clone(),
-        }));
+        folds.extend(ids.iter().map(|id| (Element::Topic(*id), key.clone())));
     }
     folds
 }
@@ -287,13 +266,10 @@ fn runs_of_roles(elements: &Elements) -> Vec<Fold> {
     let mut by_role = grouped(anonymous.map(|(id, node)| (&node.role, (id, node))));
     by_role.retain(|role, runs| runs.len() > 1 && follow(runs) && !is_taken(elements, role));
     let folds = by_role.into_iter().flat_map(|(role, runs)| {
-        runs.into_iter().map(|(id, _)| Fold {
-            what: Element::Node(id),
-            key: ItemKey {
-                kind: ItemKind::Node,
-                name: Arc::clone(role),
-            },
-        })
+        let (kind, name) = (ItemKind::Node, Arc::clone(role));
+        let key = ItemKey { kind, name };
+        runs.into_iter()
+            .map(move |(id, _)| (Element::Node(id), key.clone()))
     });
     folds.collect()
 }
@@ -303,7 +279,10 @@ fn runs_of_roles(elements: &Elements) -> Vec<Fold> {
 pub(crate) fn label(items: &mut [Item], elements: &Elements) {
     let mut order: Vec<(Stamp, usize, Arc<str>)> = Vec::new();
     for (at, item) in items.iter_mut().enumerate() {
-        let Some(node) = single_node(item, elements) else {
+        let (ItemKind::Node, [Element::Node(id)]) = (item.kind, &item.members[..]) else {
+            continue;
+        };
+        let Some(node) = elements.nodes.get(*id) else {
             continue;
         };
         let mark = item.name.rfind('?');
@@ -326,13 +305,6 @@ pub(crate) fn label(items: &mut [Item], elements: &Elements) {
             1 => role,
             n => format!("{role} ~{n}").into(),
         };
-    }
-}
-
-fn single_node<'a>(item: &Item, elements: &'a Elements) -> Option<&'a Node> {
-    match (item.kind, &item.members[..]) {
-        (ItemKind::Node, [Element::Node(id)]) => elements.nodes.get(*id),
-        _ => None,
     }
 }
 
@@ -374,12 +346,7 @@ fn alike_nodes(elements: &Elements, phases: &[Span], keys: &Keys) -> Vec<Fold> {
     let alike = grouped(nodes.filter_map(alike));
     let folds = alike.into_values().flat_map(|nodes| {
         let first = nodes.first().and_then(|what| of(keys, *what)).cloned();
-        let fold = move |what| {
-            Some(Fold {
-                what,
-                key: ItemKey::clone(first.as_ref()?),
-            })
-        };
+        let fold = move |what| Some((what, first.clone()?));
         nodes.into_iter().filter_map(fold)
     });
     folds.collect()

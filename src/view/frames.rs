@@ -9,32 +9,25 @@ use super::listed::beginning;
 use super::marked::{OngoingEvents, WindowChanges, WindowMarks};
 use super::shown::{Lengths, ShownRuns, ShownRunsWriter, stable};
 use super::state::{Alive, Lifetimes, LivingItems, Now};
-use super::{ArrowId, Counts, ItemId, Mark, MemberState, OngoingEvent, Shown, ViewOptions};
+use super::{ArrowId, Counts, ItemId, Mark, MemberState, OngoingEvent, Shown, View, ViewOptions};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{ById, Element, Id};
 use crate::mission::event_log::{EventId, Kind, Parts};
 use crate::mission::{Mission, Window};
 
-/// The windows, and the looks of each item and arrow in them.
-#[derive(Default)]
-pub(crate) struct Frames {
-    pub(crate) list: Vec<Frame>,
-    pub(crate) items: ById<ItemId, ShownRuns>,
-    pub(crate) arrows: ById<ArrowId, ShownRuns>,
-}
-
-/// The windows one after the other. In windows without headlines, only elements whose numbers changed are
-/// updated.
-pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed<'_>) -> Frames {
+/// A view of the windows one after the other, with the looks of each item and arrow in them, but not yet these. In
+/// windows without headlines, only elements whose numbers changed are updated.
+pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed<'_>) -> View {
     let mut windows = ShownWindows::new(mission, options, viewed);
     let mut writer = CaptionWriter::new(mission, viewed);
     let mut walk = mission.graphs.walk();
-    let mut list = Vec::with_capacity(mission.windows.len());
+    let mut frames = Vec::with_capacity(mission.windows.len());
     let changing = changing(mission);
     for ((at, window), is_changing) in (0..).zip(&mission.windows).zip(changing) {
         walk.next(|what, row| windows.apply(what, row));
-        let hides = windows.now.hides_the_silent() && windows.is_touched();
-        if is_changing || hides || windows.now.is_other_length(window.span) {
+        let is_touched = !(windows.items.touched.is_empty() && windows.arrows.touched.is_empty());
+        let hides = options.hide.unreachable && is_touched;
+        if is_changing || hides || window.span.nanos() != windows.now.span.nanos() {
             windows.change(at, window);
         } else {
             windows.go_on(at);
@@ -51,14 +44,16 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed<'
         };
         writer.write(&mut frame, &windows.changes.after);
         frame.many = many(&frame.caption);
-        list.push(frame);
+        frames.push(frame);
     }
-    join_empty(&mut list);
+    join_empty(&mut frames);
     let lengths = Lengths::new(mission.windows.iter().map(|w| w.span));
-    Frames {
-        list,
-        items: windows.items.finish(&lengths),
-        arrows: windows.arrows.finish(&lengths),
+    View {
+        frames,
+        items_shown: windows.items.finish(&lengths),
+        arrows_shown: windows.arrows.finish(&lengths),
+        compares: mission.log.compares,
+        ..View::default()
     }
 }
 
@@ -145,42 +140,17 @@ struct ShownWindows<'a> {
 }
 
 /// The items, or the arrows: the looks of each so far.
-#[derive(Default)]
 struct ShownSoFar<I> {
     shown: ById<I, ShownRunsWriter>,
     /// The ids of those with other numbers than in the previous window.
-    touched: Vec<I>,
-    is_touched: ById<I, bool>,
+    touched: BTreeSet<I>,
 }
 
 impl<I: Id> ShownSoFar<I> {
     fn new<T>(all: &ById<I, T>) -> Self {
         Self {
             shown: all.iter().map(|_| ShownRunsWriter::default()).collect(),
-            touched: Vec::new(),
-            is_touched: ById::like(all, false),
-        }
-    }
-
-    fn touch(&mut self, id: I) {
-        if let Some(is_touched) = self.is_touched.get_mut(id)
-            && !std::mem::replace(is_touched, true)
-        {
-            self.touched.push(id);
-        }
-    }
-
-    fn take_touched(&mut self) -> Vec<I> {
-        let all = std::mem::take(&mut self.touched);
-        for id in &all {
-            self.is_touched[*id] = false;
-        }
-        all
-    }
-
-    fn show(&mut self, window: u32, id: I, shown: Option<Shown>) {
-        if let Some(writer) = self.shown.get_mut(id) {
-            writer.show(window, shown);
+            touched: BTreeSet::new(),
         }
     }
 
@@ -210,17 +180,8 @@ impl<'a> ShownWindows<'a> {
 
     fn apply(&mut self, what: Element, row: Option<crate::graph::Row>) {
         self.now.apply(what, row);
-        let (item, arrows) = self.now.shown_by(what);
-        if let Some(item) = item {
-            self.items.touch(item);
-        }
-        for arrow in arrows {
-            self.arrows.touch(*arrow);
-        }
-    }
-
-    fn is_touched(&self) -> bool {
-        !(self.items.touched.is_empty() && self.arrows.touched.is_empty())
+        self.items.touched.extend(self.viewed.item_of(what));
+        self.arrows.touched.extend(self.viewed.carriers(what));
     }
 
     /// Shows a window with headlines, or the first after one with headlines.
@@ -241,8 +202,8 @@ impl<'a> ShownWindows<'a> {
                 self.viewed,
             ),
         };
-        self.items.take_touched();
-        self.arrows.take_touched();
+        self.items.touched.clear();
+        self.arrows.touched.clear();
         let (changes, now) = (&self.changes, &self.now);
         let there = |id| (changes.before.items[id], changes.after.items[id]);
         let items = self.viewed.items.ids();
@@ -267,7 +228,7 @@ impl<'a> ShownWindows<'a> {
                 let topic = &arrow.topics[row.topic as usize];
                 lined.extend(ends.filter_map(|(end, is)| is.then_some((end, topic))));
             }
-            self.arrows.show(at, id, shown);
+            self.arrows.shown[id].show(at, shown);
         }
         let mut unlined = ById::like(&items, BTreeSet::new());
         for (publish, topic) in self.viewed.bundles() {
@@ -285,7 +246,7 @@ impl<'a> ShownWindows<'a> {
                 unlined: unlined.clone(),
                 ..shown
             });
-            self.items.show(at, id, shown);
+            self.items.shown[id].show(at, shown);
         }
     }
 
@@ -320,18 +281,19 @@ impl<'a> ShownWindows<'a> {
         }
         let (changes, now) = (&self.changes, &self.now);
         let (after, stays) = (&changes.after, (true, true));
-        for id in self.items.take_touched() {
+        for id in std::mem::take(&mut self.items.touched) {
             let shown = after.items[id].then(|| changes.item(now, id, stays));
             let unlined = self.unlined[id].clone();
             let shown = shown.flatten().map(|shown| Shown { unlined, ..shown });
-            self.items.show(at, id, shown);
+            self.items.shown[id].show(at, shown);
         }
-        for id in self.arrows.take_touched() {
+        for id in std::mem::take(&mut self.arrows.touched) {
             let ends = [self.viewed.arrows[id].from, self.viewed.arrows[id].to];
             let is_there = after.arrows[id] && ends.iter().all(|end| after.items[*end]);
-            let marks = ends.map(|id| Some(changes.marks.items.get(&id)?.as_end()));
+            let marks = ends.map(|id| changes.marks.items.get(&id));
+            let marks = marks.map(|changed| Some((changed?.mark, &changed?.events[..])));
             let shown = is_there.then(|| changes.arrow(now, id, stays, marks));
-            self.arrows.show(at, id, shown.flatten());
+            self.arrows.shown[id].show(at, shown.flatten());
         }
     }
 }
@@ -407,7 +369,7 @@ impl Phrase {
     }
 }
 
-/// One window of the picture; the items and arrows in it are in [`View::seen`](super::View::seen).
+/// One window of the picture; the items and arrows in it are in [`View::seen`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frame {
     /// The window's index, counted from 0.
@@ -418,7 +380,7 @@ pub struct Frame {
     pub partial: bool,
     /// The number of all messages in the window, including those of hidden topics.
     pub messages: u64,
-    /// For each namespace that represents several, in the order of [`View::namespaces`](super::View::namespaces), the
+    /// For each namespace that represents several, in the order of [`View::namespaces`], the
     /// presence of each of them.
     pub member_lists: Vec<Vec<MemberState>>,
     /// The events that begin in it, in the order of the event log. Headline, marks and timeline are all made from these.
@@ -564,31 +526,27 @@ impl Counts {
     fn sum(all: impl Iterator<Item = (Kind, Element)>) -> Self {
         let mut counts = Self::default();
         for (kind, what) in all {
-            *counts.slot(kind, what) += 1;
+            let is_topic = what.is_topic();
+            *match kind {
+                Kind::Started => &mut counts.nodes_added,
+                Kind::Stopped => &mut counts.nodes_removed,
+                Kind::Restarted => &mut counts.restarted,
+                Kind::Silent => &mut counts.silent,
+                Kind::Appeared if is_topic => &mut counts.topics_added,
+                Kind::Appeared => &mut counts.edges_added,
+                Kind::Vanished if is_topic => &mut counts.topics_removed,
+                Kind::Vanished => &mut counts.edges_removed,
+                Kind::HandedOver => &mut counts.handed_over,
+                Kind::Rate => &mut counts.rates,
+                Kind::Lifecycle
+                | Kind::Type
+                | Kind::Qos
+                | Kind::Starved
+                | Kind::Duplicate
+                | Kind::Lost => &mut counts.values,
+            } += 1;
         }
         counts
-    }
-
-    fn slot(&mut self, kind: Kind, what: Element) -> &mut usize {
-        let is_topic = what.is_topic();
-        match kind {
-            Kind::Started => &mut self.nodes_added,
-            Kind::Stopped => &mut self.nodes_removed,
-            Kind::Restarted => &mut self.restarted,
-            Kind::Silent => &mut self.silent,
-            Kind::Appeared if is_topic => &mut self.topics_added,
-            Kind::Appeared => &mut self.edges_added,
-            Kind::Vanished if is_topic => &mut self.topics_removed,
-            Kind::Vanished => &mut self.edges_removed,
-            Kind::HandedOver => &mut self.handed_over,
-            Kind::Rate => &mut self.rates,
-            Kind::Lifecycle
-            | Kind::Type
-            | Kind::Qos
-            | Kind::Starved
-            | Kind::Duplicate
-            | Kind::Lost => &mut self.values,
-        }
     }
 
     /// The number of all headlines.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::choose::{Selection, finish, is_debug_label, select};
 use super::fold::equal::Fleets;
-use super::fold::{self, Boxes, Groups, ItemKey};
+use super::fold::{self, Groups, ItemKey};
 use super::listed::{self, Words};
 use super::{Arrow, ArrowId, ArrowKind, Grouping, Item, ItemId, ItemKind, Mode, ViewOptions};
 use crate::base::name::last_part;
@@ -26,7 +26,6 @@ pub(crate) enum Place {
 }
 
 /// Every box and arrow, and the mapping from the graph's elements to them.
-#[derive(Clone, Debug)]
 pub(crate) struct Viewed<'a> {
     pub(crate) elements: &'a Elements,
     pub(crate) selection: Selection,
@@ -120,14 +119,7 @@ impl<'a> Viewed<'a> {
 
     fn set_items(&mut self, mission: &Mission, options: &ViewOptions, groups: &Groups) {
         let elements = self.elements;
-        let mut keys = Boxes {
-            elements,
-            options,
-            fleets: &self.fleets,
-            selection: &self.selection,
-            groups,
-        }
-        .keys();
+        let mut keys = fold::keys(elements, options, &self.fleets, &self.selection, groups);
         let words = Words::new(mission, options, (&self.selection, &self.drawn), &mut keys);
         let shown = keys.iter();
         let shown = shown.filter_map(|(what, key)| Some((key.as_ref()?, what)));

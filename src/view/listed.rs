@@ -264,7 +264,6 @@ pub(crate) fn also_here(
 }
 
 /// The drawn part of a view. Its windows are left out.
-#[derive(Debug)]
 pub(crate) struct DrawnPart {
     /// The boxes and arrows that are drawn, and the other items as words.
     pub(crate) view: View,
@@ -290,10 +289,8 @@ pub(crate) fn drawn_part(
     let hidden: ById<ItemId, bool> = view.items.iter().map(is_hidden).collect();
     let arrows = view.arrows.iter();
     let ends = arrows.map(|arrow| [arrow.from, arrow.to]);
-    let arrows: ById<ArrowId, bool> = ends
-        .clone()
-        .map(|ends| !ends.iter().any(|at| hidden[*at]))
-        .collect();
+    let drawn = ends.clone().map(|ends| !ends.iter().any(|at| hidden[*at]));
+    let arrows: ById<ArrowId, bool> = drawn.collect();
     let lined = ends.zip(&arrows).filter(|(_, drawn)| **drawn);
     let lined: BTreeSet<ItemId> = lined.flat_map(|(ends, _)| ends).collect();
     let is_node = |at: ItemId| view.items[at].kind == ItemKind::Node;

@@ -31,13 +31,6 @@ pub(crate) struct Changed {
     pub(crate) events: Vec<EventId>,
 }
 
-impl Changed {
-    /// As the end of an arrow.
-    pub(crate) fn as_end(&self) -> EndMark<'_> {
-        (self.mark, &self.events)
-    }
-}
-
 /// The changes of one window by the id of the item or arrow.
 #[derive(Default)]
 pub(crate) struct WindowMarks {
@@ -190,37 +183,26 @@ struct Report<'a> {
     part: Part,
 }
 
+/// The mark for a part of an event on an element that existed before and still does.
+fn mark(event: &Event, part: Part, reach: Reach) -> Option<Mark> {
+    let is_faster = matches!(event.detail, Detail::Rates { from_hz, to_hz } if to_hz > from_hz);
+    match (event.kind, reach, part) {
+        (_, Reach::Whole, Part::Leaves) => Some(Mark::Removed),
+        (_, Reach::Whole, Part::Away) => Some(Mark::Away),
+        (_, Reach::Whole, Part::Back) => Some(Mark::Restarted),
+        (Kind::Rate, Reach::Whole | Reach::Part, _) if is_faster => Some(Mark::Faster),
+        (Kind::Rate, Reach::Whole | Reach::Part, _) => Some(Mark::Slower),
+        (_, Reach::Part | Reach::Inside, _) => Some(Mark::Inside),
+        (Kind::Restarted, ..) => Some(Mark::Restarted),
+        (Kind::Silent, ..) => Some(Mark::Paused),
+        (Kind::HandedOver, ..) => Some(Mark::HandedOver),
+        (kind, ..) if kind.is_remark() => Some(Mark::Changed),
+        (Kind::Lifecycle | Kind::Type | Kind::Qos, ..) => Some(Mark::Changed),
+        _ => None,
+    }
+}
+
 impl Report<'_> {
-    /// Messages per second before and after.
-    fn rates(&self) -> Option<(f64, f64)> {
-        match self.event.detail {
-            Detail::Rates { from_hz, to_hz } => Some((from_hz, to_hz)),
-            _ => None,
-        }
-    }
-
-    /// The mark on an element that existed before and still does.
-    fn mark(&self, reach: Reach) -> Option<Mark> {
-        let is_faster = self.rates().is_some_and(|(from, to)| to > from);
-        match (self.part, reach) {
-            (_, Reach::Part | Reach::Inside) | (Part::Whole, _) => {}
-            (Part::Leaves, Reach::Whole) => return Some(Mark::Removed),
-            (Part::Away, Reach::Whole) => return Some(Mark::Away),
-            (Part::Back, Reach::Whole) => return Some(Mark::Restarted),
-        }
-        match (self.event.kind, reach) {
-            (Kind::Rate, Reach::Whole | Reach::Part) if is_faster => Some(Mark::Faster),
-            (Kind::Rate, Reach::Whole | Reach::Part) => Some(Mark::Slower),
-            (_, Reach::Part | Reach::Inside) => Some(Mark::Inside),
-            (Kind::Restarted, _) => Some(Mark::Restarted),
-            (Kind::Silent, _) => Some(Mark::Paused),
-            (Kind::HandedOver, _) => Some(Mark::HandedOver),
-            (kind, _) if kind.is_remark() => Some(Mark::Changed),
-            (Kind::Lifecycle | Kind::Type | Kind::Qos, _) => Some(Mark::Changed),
-            _ => None,
-        }
-    }
-
     /// Records the event for an item or arrow; of several marks on the same one, the most informative one
     /// stays.
     fn keep<I: Ord>(&self, all: &mut BTreeMap<I, Changed>, id: I, reach: Reach) {
@@ -230,23 +212,27 @@ impl Report<'_> {
         if let Err(place) = reported.events.binary_search(&self.headline) {
             reported.events.insert(place, self.headline);
         }
-        if let Some(rates) = self.rates().filter(|_| reach == Reach::Whole) {
-            then(&mut reported.rates, rates);
+        if reach == Reach::Whole {
+            then(&mut reported.rates, self.event);
         }
-        let mark = self.mark(reach);
+        let mark = mark(self.event, self.part, reach);
         if mark.map(weight) > reported.mark.map(weight) {
             reported.mark = mark;
         }
     }
 }
 
-/// Adds the rates before and after a change to those of the changes before it, unless it is one of these on another edge.
-fn then(rates: &mut Vec<f64>, (before, after): (f64, f64)) {
+/// Adds the rates before and after a change of rates to those of the changes before it, unless it is one of these on another
+/// edge.
+fn then(rates: &mut Vec<f64>, event: &Event) {
+    let Detail::Rates { from_hz, to_hz } = event.detail else {
+        return;
+    };
     if rates.is_empty() {
-        rates.push(before);
+        rates.push(from_hz);
     }
-    if rates.last().is_some_and(|last| !same(*last, after)) {
-        rates.push(after);
+    if rates.last().is_some_and(|last| !same(*last, to_hz)) {
+        rates.push(to_hz);
     }
 }
 
@@ -335,11 +321,9 @@ impl WindowChanges {
                 _ => {
                     let own = events.get(&arrow.topics[row.topic as usize]);
                     for event in own.into_iter().flatten() {
-                        let (mark, rates) = changed(event);
-                        row.mark = Some(mark);
-                        if let Some(rates) = rates {
-                            then(&mut row.steps, rates);
-                        }
+                        let mark = mark(event, Part::Whole, Reach::Whole);
+                        row.mark = mark.or(Some(Mark::Changed));
+                        then(&mut row.steps, event);
                     }
                 }
             }
@@ -353,23 +337,6 @@ impl WindowChanges {
         let reported = reported.filter_map(|id| all.binary_search_by_key(id, |h| h.event).ok());
         let counts = Counts::inside(reported.map(|at| &all[at]));
         (counts.total() > 0).then(|| Box::new(counts))
-    }
-}
-
-/// The mark of a topic of a bundle for an event, with its rates before and after.
-fn changed(event: &Event) -> (Mark, Option<(f64, f64)>) {
-    match (event.kind, &event.detail) {
-        (_, Detail::Rates { from_hz, to_hz }) => {
-            let mark = if to_hz > from_hz {
-                Mark::Faster
-            } else {
-                Mark::Slower
-            };
-            (mark, Some((*from_hz, *to_hz)))
-        }
-        (Kind::HandedOver, _) => (Mark::HandedOver, None),
-        (Kind::Silent, _) => (Mark::Paused, None),
-        _ => (Mark::Changed, None),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Notices about what the picture leaves out, about options that match nothing, and the error of a view that shows nothing.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -72,13 +73,10 @@ fn words(reason: Reason) -> (&'static str, String) {
 }
 
 fn examples(names: &[&str]) -> String {
-    let mut list: Vec<String> = names
-        .iter()
-        .take(EXAMPLES)
-        .map(|n| words::shorten(n, 60).into_owned())
-        .collect();
+    let some = names.iter().take(EXAMPLES);
+    let mut list: Vec<Cow<'_, str>> = some.map(|n| words::shorten(n, 60)).collect();
     if names.len() > EXAMPLES {
-        list.push("…".to_owned());
+        list.push("…".into());
     }
     list.join(", ")
 }
@@ -93,10 +91,8 @@ fn names(elements: &Elements) -> [Vec<&str>; 2] {
 /// The error of a view without any of these elements.
 pub(crate) fn nothing(elements: &Elements) -> Error {
     let all = words::count(elements.nodes.len() + elements.topics.len(), "name");
-    Error::usage(
-        format!("nothing is left to draw of {all}"),
-        "show more with `--hide none` or wider filters",
-    )
+    let what = format!("nothing is left to draw of {all}");
+    Error::usage(what, "show more with `--hide none` or wider filters")
 }
 
 /// Checks that each filter of names matches an element.

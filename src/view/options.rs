@@ -144,12 +144,9 @@ impl Grouping {
                 ("images", "") => group.images = true,
                 ("namespaces", "") => group.namespaces = None,
                 ("namespaces", depth) => {
-                    group.namespaces = Some(depth.parse().map_err(|_| {
-                        Error::usage(
-                            format!("`{depth}` is not a number of namespace levels"),
-                            "write a whole number: `namespaces=2`",
-                        )
-                    })?);
+                    let what = format!("`{depth}` is not a number of namespace levels");
+                    let bad = |_| Error::usage(what, "write a whole number: `namespaces=2`");
+                    group.namespaces = Some(depth.parse().map_err(bad)?);
                 }
                 _ => {
                     let all = "actions, tf, images, namespaces, namespaces=N, none";
@@ -250,10 +247,8 @@ fn words(list: &str) -> impl Iterator<Item = &str> {
 }
 
 fn unknown(what: &str, word: &str, all: &str) -> Error {
-    Error::usage(
-        format!("`{word}` is not a {what}"),
-        format!("one of: {all}"),
-    )
+    let what = format!("`{word}` is not a {what}");
+    Error::usage(what, format!("one of: {all}"))
 }
 
 /// A list of names and patterns, some of them exclusions. The default accepts every name.
@@ -344,10 +339,9 @@ fn anchored(pattern: &str) -> Result<Regex> {
         let text = error.to_string();
         let reason = text.lines().last().unwrap_or_default();
         let reason = reason.trim().trim_start_matches("error: ");
-        Error::usage(
-            format!("`{pattern}` is not a pattern for names: {reason}"),
-            "patterns are regular expressions: `/robot1/.*`, `-/rqt.*`",
-        )
+        let what = format!("`{pattern}` is not a pattern for names: {reason}");
+        let hint = "patterns are regular expressions: `/robot1/.*`, `-/rqt.*`";
+        Error::usage(what, hint)
     })
 }
 

@@ -377,14 +377,18 @@ impl ShownRuns {
         self.runs.spans(windows).filter_map(look)
     }
 
+    /// The windows in which one of `all` changes.
+    pub(crate) fn turns<'a>(all: impl Iterator<Item = &'a Self>) -> BTreeSet<u32> {
+        all.flat_map(Self::runs).map(|run| run.0).collect()
+    }
+
     /// The looks made by `look` in the windows in which one of `all` changes.
     pub(crate) fn made_of<'a>(
         all: impl Iterator<Item = &'a Self>,
         look: impl Fn(usize) -> Option<Shown>,
     ) -> Self {
-        let windows: BTreeSet<u32> = all.flat_map(Self::runs).map(|run| run.0).collect();
         let mut writer = ShownRunsWriter::default();
-        for window in windows {
+        for window in Self::turns(all) {
             writer.show(window, look(window as usize));
         }
         writer.finish()
@@ -497,26 +501,6 @@ fn key(shown: &Shown) -> LookKey {
         shown.lifecycle.clone(),
         shown.unlined.clone(),
     )
-}
-
-/// The windows in which one of two looks differs from the previous window, with both looks.
-pub(crate) fn both<'a>(
-    a: &'a ShownRuns,
-    b: &'a ShownRuns,
-) -> impl Iterator<Item = (Option<&'a Shown>, Option<&'a Shown>)> {
-    let (mut next_a, mut next_b) = (a.runs().peekable(), b.runs().peekable());
-    let (mut now_a, mut now_b) = (None, None);
-    std::iter::from_fn(move || {
-        let starts = [next_a.peek().map(|r| r.0), next_b.peek().map(|r| r.0)];
-        let window = starts.into_iter().flatten().min()?;
-        if let Some((_, shown)) = next_a.next_if(|run| run.0 == window) {
-            now_a = shown;
-        }
-        if let Some((_, shown)) = next_b.next_if(|run| run.0 == window) {
-            now_b = shown;
-        }
-        Some((now_a, now_b))
-    })
 }
 
 // The look of an element over several windows, without flicker from window to window.
@@ -790,7 +774,12 @@ mod tests {
         let a = ShownRuns::of([one.as_ref(), one.as_ref(), two.as_ref()]);
         let b = ShownRuns::of([None, one.as_ref(), one.as_ref()]);
         let hz = |shown: Option<&Shown>| shown.and_then(|s| s.hz);
-        let reported: Vec<_> = both(&a, &b).map(|(a, b)| (hz(a), hz(b))).collect();
+        let turns = ShownRuns::turns([&a, &b].into_iter());
+        let looks = turns.into_iter().map(|window| {
+            let at = |looks: &ShownRuns| hz(looks.at(window as usize));
+            (at(&a), at(&b))
+        });
+        let reported: Vec<_> = looks.collect();
         let want = [(1.0, None), (1.0, Some(1.0)), (2.0, Some(1.0))];
         assert_eq!(reported, want.map(|(a, b)| (Some(a), b)));
     }

@@ -92,7 +92,7 @@ pub(crate) struct Now<'a> {
     options: &'a ViewOptions,
     pub(crate) viewed: &'a Viewed<'a>,
     /// The current window, or an earlier one of the same length.
-    span: Span,
+    pub(super) span: Span,
     /// The elements that exist in it, and those that pause.
     lives: (Alive, Alive),
     /// The row of the graph for each element that is in it, by element.
@@ -139,11 +139,6 @@ impl<'a> Now<'a> {
     /// Sets the elements that exist and pause from this window on.
     pub(crate) fn live(&mut self, window: Span, alive: Alive, paused: Alive) {
         (self.span, self.lives) = (window, (alive, paused));
-    }
-
-    /// Whether a window is longer or shorter than the current one, so that rates differ.
-    pub(crate) fn is_other_length(&self, window: Span) -> bool {
-        window.nanos() != self.span.nanos()
     }
 
     /// The look of an element, `None` if it does not exist; silent and only declared if it exists without messages.
@@ -316,10 +311,8 @@ impl<'a> Now<'a> {
         let (mut last, mut carried, mut services) = (None, BTreeSet::new(), BTreeSet::new());
         let mut rows: BTreeMap<u32, (Option<Shown>, [bool; 2])> = BTreeMap::new();
         for (publish, subscribe) in self.viewed.pairs.get(id)? {
-            let (Some(p), Some(s)) = (
-                self.one(Element::Publish(*publish)),
-                self.one(Element::Subscribe(*subscribe)),
-            ) else {
+            let ends = [Element::Publish(*publish), Element::Subscribe(*subscribe)];
+            let [Some(p), Some(s)] = ends.map(|end| self.one(end)) else {
                 continue;
             };
             let row = self.viewed.row(arrow, (*publish, *subscribe));
@@ -369,16 +362,6 @@ impl<'a> Now<'a> {
     /// An event of the log.
     pub(crate) fn event(&self, id: EventId) -> Option<&Event> {
         self.mission.log.events.get(id)
-    }
-
-    /// Whether the options hide elements without messages in a window.
-    pub(crate) fn hides_the_silent(&self) -> bool {
-        self.options.hide.unreachable
-    }
-
-    /// The item that shows an element, and the arrows.
-    pub(crate) fn shown_by(&self, what: Element) -> (Option<ItemId>, &[ArrowId]) {
-        (self.viewed.item_of(what), self.viewed.carriers(what))
     }
 }
 

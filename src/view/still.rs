@@ -202,37 +202,32 @@ fn gather(slot: &mut Option<Shown>, shown: &Shown, length: f64, windows: u64) {
         steps: Vec::new(),
         ..row.clone()
     });
+    let shown = Shown {
+        unlined: Vec::new(),
+        topics: rows.collect(),
+        mark: None,
+        sender: None,
+        hz: shown.hz.map(|hz| hz * length),
+        steps: Vec::new(),
+        events: Vec::new(),
+        inside: None,
+        lifecycle: None,
+        count,
+        ..shown.clone()
+    };
     let Some(sum) = slot else {
-        *slot = Some(Shown {
-            unlined: Vec::new(),
-            topics: rows.collect(),
-            mark: None,
-            sender: None,
-            hz: shown.hz.map(|hz| hz * length),
-            steps: Vec::new(),
-            events: Vec::new(),
-            inside: None,
-            lifecycle: None,
-            count,
-            ..shown.clone()
-        });
+        *slot = Some(shown);
         return;
     };
-    for row in rows {
+    let states = [sum.state, shown.state];
+    sum.add(&shown);
+    sum.state = in_both(states, sum.count);
+    for row in shown.topics {
         match sum.topics.binary_search_by_key(&row.topic, |r| r.topic) {
             Err(place) => sum.topics.insert(place, row),
             Ok(place) => add_row(&mut sum.topics[place], &row),
         }
     }
-    let states = [sum.state, shown.state];
-    sum.add(&Shown {
-        hz: shown.hz.map(|hz| hz * length),
-        count,
-        is_paused: shown.is_paused,
-        is_starved: shown.is_starved,
-        ..Shown::plain(0, shown.state, shown.confidence)
-    });
-    sum.state = in_both(states, sum.count);
 }
 
 fn add_row(sum: &mut TopicRow, row: &TopicRow) {
@@ -274,17 +269,16 @@ fn presence(item: &Item, mission: &Mission, marks: &NodeMarks) -> Presence {
     let nodes = || item.members.iter().filter(|what| what.is_node());
     let lives = nodes().flat_map(|what| mission.elements.seen(*what).lives.iter().copied());
     let times = Span::joined(lives.collect(), 0);
-    let part = |at| mission.span.part(at);
-    let mut own: Vec<_> = nodes()
-        .filter_map(|what| marks.get(what))
-        .flatten()
-        .collect();
+    let parts = |life: &Span| {
+        [life.start, life.end]
+            .map(|at| mission.span.part(at))
+            .into()
+    };
+    let own = nodes().filter_map(|what| marks.get(what));
+    let mut own: Vec<_> = own.flatten().collect();
     own.sort_by_key(|(id, ..)| *id);
     Presence {
-        times: times
-            .iter()
-            .map(|life| (part(life.start), part(life.end)))
-            .collect(),
+        times: times.iter().map(parts).collect(),
         marks: own.into_iter().map(|(_, at, mark)| (*at, *mark)).collect(),
     }
 }
@@ -310,14 +304,12 @@ pub(crate) fn headline(mission: &Mission, elements: String) -> Vec<Phrase> {
     let (phases, restarts) = (mission.log.phases.len(), many(Kind::Restarted));
     let hands = many(Kind::HandedOver);
     let change = if hands == 1 { "changes" } else { "change" };
+    let topics = words::count(hands, "topic");
     let parts = [
         (true, elements),
         (phases > 1, words::count(phases, "phase")),
         (restarts > 0, words::count(restarts, "restart")),
-        (
-            hands > 0,
-            format!("{} {change} hands", words::count(hands, "topic")),
-        ),
+        (hands > 0, format!("{topics} {change} hands")),
     ];
     let parts = parts.into_iter().filter(|(is_told, _)| *is_told);
     let parts: Vec<String> = parts.map(|(_, words)| words).collect();

@@ -16,7 +16,6 @@ const INSIDE: f64 = 1.3;
 const HEAD: f64 = 0.6;
 
 /// One reconfiguration.
-#[derive(Clone, Debug)]
 pub(crate) struct StepPanel {
     /// The phases before and after: `2 → 3`.
     pub(crate) number: String,
@@ -115,23 +114,17 @@ fn draw(
     width: f64,
 ) -> (f64, Point) {
     let inner = width - 2.0 * INSIDE;
-    let notes: Vec<Unbroken> = panel
-        .handovers
-        .iter()
-        .map(|text| sentence(ink::CHANGED, text.as_str()))
-        .collect();
+    let notes = panel.handovers.iter();
+    let notes = notes.map(|text| sentence(ink::CHANGED, &**text));
+    let notes: Vec<Unbroken> = notes.collect();
     let top = corner.y + INSIDE * 0.8;
     let graph = top + canvas.sizes.pitch() + HEAD;
     let graph_end = graph + panel.picture.size.h / PX_PER_MM + 0.5;
     let x = corner.x + INSIDE;
     let end = flow_at(canvas, Point::new(x, graph_end), inner, &notes) + INSIDE * 0.4;
     let border = Rect::new(corner.x, corner.y, width, end - corner.y);
-    canvas.frame(
-        border,
-        0.4,
-        Color::NONE,
-        &Stroke::solid(ink::FOLDED, HAIRLINE),
-    );
+    let stroke = Stroke::solid(ink::FOLDED, HAIRLINE);
+    canvas.frame(border, 0.4, Color::NONE, &stroke);
     let y = top + canvas.cap(Type::Head) / 2.0 + 0.2;
     let number = format!("({letter}) {}", panel.number);
     canvas.text(x, y, Type::Head, ink::TEXT, &number);
@@ -162,14 +155,10 @@ fn fold_repeated(panels: &mut Vec<StepPanel>) -> Vec<String> {
             "" => "elsewhere".to_owned(),
             home => format!("in {home}"),
         };
-        let parts: Vec<&str> = std::iter::once(&*place)
-            .chain(panel.handovers.iter().map(String::as_str))
-            .collect();
-        repeated.push(format!(
-            "{} as {first}, {}.",
-            panel.number,
-            parts.join("; ")
-        ));
+        let handovers = panel.handovers.iter().map(String::as_str);
+        let parts: Vec<&str> = std::iter::once(&*place).chain(handovers).collect();
+        let parts = parts.join("; ");
+        repeated.push(format!("{} as {first}, {parts}.", panel.number));
         false
     });
     repeated
@@ -181,9 +170,7 @@ fn notes(
     repeated: &[String],
     left_out: usize,
 ) -> Vec<Unbroken> {
-    let again = repeated
-        .iter()
-        .map(|text| sentence(ink::TEXT, text.as_str()));
+    let again = repeated.iter().map(|text| sentence(ink::TEXT, &**text));
     let mut items: Vec<Unbroken> = again.collect();
     let mut quiet = |text: String| items.push(sentence(ink::QUIET, text));
     if !sheet.options.is_bare {
@@ -194,16 +181,12 @@ fn notes(
     }
     if panels.iter().any(|p| p.left_out > 0) {
         let each: Vec<String> = panels.iter().map(|p| p.left_out.to_string()).collect();
-        quiet(format!(
-            "Nodes not drawn, panel by panel: {}.",
-            each.join(", ")
-        ));
+        let each = each.join(", ");
+        quiet(format!("Nodes not drawn, panel by panel: {each}."));
     }
     if left_out > 0 {
-        quiet(format!(
-            "{} left out.",
-            words::count(left_out, "smaller step")
-        ));
+        let steps = words::count(left_out, "smaller step");
+        quiet(format!("{steps} left out."));
     }
     items
 }

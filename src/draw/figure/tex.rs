@@ -26,10 +26,12 @@ pub(crate) fn caption(
     }
     if let Some(bag) = source.mission.bags.first() {
         let length = words::duration(source.span().nanos());
-        let name = escaped(&words::visible(&bag.name));
+        let (name, version) = (
+            escaped(&words::visible(&bag.name)),
+            env!("CARGO_PKG_VERSION"),
+        );
         parts.push(format!(
-            "Bag \\texttt{{{name}}}, {length}; bagreel {}.",
-            env!("CARGO_PKG_VERSION")
+            "Bag \\texttt{{{name}}}, {length}; bagreel {version}."
         ));
     }
     if options.is_bare {
@@ -112,10 +114,7 @@ impl Latex {
     pub(crate) fn file(&self, tex: &Path) -> String {
         let star = if self.is_wide { "*" } else { "" };
         let stem = tex.file_stem().unwrap_or_default().to_string_lossy();
-        let label: String = stem
-            .chars()
-            .map(|c| if c.is_alphanumeric() { c } else { '-' })
-            .collect();
+        let label = stem.replace(|c: char| !c.is_alphanumeric(), "-");
         format!(
             "% Written by bagreel. Needs \\usepackage{{graphicx}}.\n\\begin{{figure{star}}}[t]\n  \\centering\n  \
              \\includegraphics{{{}}}\n  \\caption{{{}}}\n  \\label{{fig:{label}}}\n\\end{{figure{star}}}\n",
@@ -134,13 +133,9 @@ fn relative(path: &Path, folder: &Path) -> String {
     }
     let is_near = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
     let path = if steps.clone().all(is_near) {
-        let up = steps
-            .filter(|part| *part != Component::CurDir)
-            .map(|_| "..");
-        up.map(Path::new)
-            .map(Path::as_os_str)
-            .chain(own.map(Component::as_os_str))
-            .collect()
+        let up = steps.filter(|part| *part != Component::CurDir);
+        let up = up.map(|_| Component::ParentDir);
+        up.chain(own).collect()
     } else {
         std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
     };

@@ -4,8 +4,9 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use super::svg::{write_ellipse, write_rect};
 use super::xml::{Xml, tenth, units};
-use crate::base::geometry::Point;
+use crate::base::geometry::{Point, Rect};
 use crate::draw::picture::{Union, UnionElement};
 use crate::draw::scene::{Form, Group, Piece, Step, Stroke};
 use crate::draw::style::{Body, Change, Color, Quiet, Style};
@@ -13,7 +14,6 @@ use crate::graph::Id as _;
 use crate::view::{ArrowId, ItemId, Mark, STEPS, View, decades};
 
 /// A graph in SVG.
-#[derive(Debug)]
 pub(crate) struct Classes<'a> {
     pub(crate) view: &'a View,
     pub(crate) union: &'a Union,
@@ -125,21 +125,10 @@ impl Classes<'_> {
         match form {
             Form::Rect(r, radius) => {
                 // Coordinates of edges are rounded, not lengths, so that adjacent shapes stay adjacent.
-                xml.attribute("x", tenth(r.x))
-                    .attribute("y", tenth(r.y))
-                    .attribute("width", tenth(r.right() - r.x))
-                    .attribute("height", tenth(r.bottom() - r.y));
-                if *radius > 0.0 {
-                    xml.attribute("rx", tenth(*radius));
-                }
+                let place = Rect::new(r.x, r.y, r.right() - r.x, r.bottom() - r.y);
+                write_rect(xml, &place, *radius);
             }
-            Form::Ellipse(r) => {
-                let c = r.centre();
-                xml.attribute("cx", tenth(c.x))
-                    .attribute("cy", tenth(c.y))
-                    .attribute("rx", tenth(r.w / 2.0))
-                    .attribute("ry", tenth(r.h / 2.0));
-            }
+            Form::Ellipse(r) => write_ellipse(xml, r),
             Form::Path(steps) => {
                 xml.attribute("d", path(steps));
             }

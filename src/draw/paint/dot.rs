@@ -27,7 +27,6 @@ const HEIGHT: f64 = 36.0;
 const LINE: f64 = 15.0;
 
 /// A view with the parts that all its DOT files share: unique ids and one layout.
-#[derive(Clone, Debug)]
 pub(crate) struct DotView<'a> {
     elements: &'a Elements,
     view: &'a View,

@@ -6,7 +6,6 @@ use harfrust::{Direction, ShapeOptions, ShaperData, UnicodeBuffer};
 use pdf_writer::types::{
     CidFontType, FontFlags, LineCapStyle, LineJoinStyle, SystemInfo, UnicodeCmap,
 };
-use pdf_writer::writers::Resources;
 use pdf_writer::{Content, Filter, Finish as _, Name, Pdf, Rect as PdfRect, Ref, Str, TextStr};
 use skrifa::instance::{LocationRef, Size};
 use skrifa::metrics::GlyphMetrics;
@@ -65,7 +64,7 @@ pub(crate) fn write(
         if let Some(face) = face.as_ref().filter(|face| face.is_used()) {
             let ids: [Ref; 5] = file.ids();
             face.write(&mut file.pdf, ids[0])?;
-            used.push((name('F', place), ids[0]));
+            used.push((name(place), ids[0]));
         }
     }
     let pages = drawn.iter();
@@ -117,7 +116,13 @@ impl PdfFile {
         page.parent(tree)
             .media_box(PdfRect::new(0.0, 0.0, drawn.size.0, drawn.size.1))
             .contents(content);
-        add_fonts(&mut page.resources(), fonts);
+        let mut resources = page.resources();
+        let mut all = resources.fonts();
+        for (name, font) in fonts {
+            all.pair(Name(name.as_bytes()), *font);
+        }
+        all.finish();
+        resources.finish();
         page.finish();
         pdf.stream(content, &drawn.content)
             .filter(Filter::FlateDecode);
@@ -149,16 +154,9 @@ impl PdfFile {
     }
 }
 
-fn add_fonts(resources: &mut Resources<'_>, fonts: &[(String, Ref)]) {
-    let mut all = resources.fonts();
-    for (name, font) in fonts {
-        all.pair(Name(name.as_bytes()), *font);
-    }
-}
-
-/// The name of a resource.
-fn name(kind: char, place: usize) -> String {
-    format!("{kind}{place}")
+/// The name of a font.
+fn name(place: usize) -> String {
+    format!("F{place}")
 }
 
 /// A length on a page.
@@ -226,7 +224,7 @@ impl PdfPen<'_> {
         if fill(content, text.color) {
             for (file, run) in &runs {
                 if let Some(Some(face)) = self.faces.get_mut(*file) {
-                    face.show(content, Name(name('F', *file).as_bytes()), run, size);
+                    face.show(content, Name(name(*file).as_bytes()), run, size);
                 }
             }
         }
@@ -428,15 +426,14 @@ impl<'a> PdfFont<'a> {
             .zip(positions)
             .enumerate()
             .map(|(place, (info, to))| {
-                let later = infos[place..]
-                    .iter()
-                    .find(|next| next.cluster > info.cluster);
+                let mut later = infos[place..].iter();
+                let later = later.find(|next| next.cluster > info.cluster);
                 let end = later.map_or(text.len(), |next| next.cluster as usize);
                 let is_first = before.replace(info.cluster) != Some(info.cluster);
                 let shown = text.get(info.cluster as usize..end).filter(|_| is_first);
                 let id = u16::try_from(info.glyph_id).unwrap_or_default();
                 let advance = to.x_advance as f32 / self.units;
-                let offset = (
+                let (dx, dy) = (
                     to.x_offset as f32 / self.units,
                     to.y_offset as f32 / self.units,
                 );
@@ -444,9 +441,9 @@ impl<'a> PdfFont<'a> {
                 x += advance * size;
                 Glyph {
                     id,
-                    at: (from + offset.0 * size, at.1 - offset.1 * size),
+                    at: (from + dx * size, at.1 - dy * size),
                     shown: shown.unwrap_or_default(),
-                    is_regular: offset == (0.0, 0.0) && (advance - self.width(id)).abs() < 1e-6,
+                    is_regular: (dx, dy) == (0.0, 0.0) && (advance - self.width(id)).abs() < 1e-6,
                 }
             });
         glyphs.collect()
@@ -567,16 +564,13 @@ impl<'a> PdfFont<'a> {
         let metrics = self.font.metrics(Size::unscaled(), LocationRef::default());
         let scaled = |length: f32| length * PER_EM / self.units;
         let bounds = metrics.bounds.unwrap_or_default();
+        let [x_min, y_min] = [bounds.x_min, bounds.y_min].map(scaled);
+        let [x_max, y_max] = [bounds.x_max, bounds.y_max].map(scaled);
         let mut descriptor = pdf.font_descriptor(id);
         descriptor
             .name(name)
             .flags(FontFlags::SYMBOLIC)
-            .bbox(PdfRect::new(
-                scaled(bounds.x_min),
-                scaled(bounds.y_min),
-                scaled(bounds.x_max),
-                scaled(bounds.y_max),
-            ))
+            .bbox(PdfRect::new(x_min, y_min, x_max, y_max))
             .italic_angle(metrics.italic_angle)
             .ascent(scaled(metrics.ascent))
             .descent(scaled(metrics.descent))
@@ -601,14 +595,10 @@ impl<'a> PdfFont<'a> {
         .take(6)
         .collect();
         let name = self.font.localized_strings(StringId::POSTSCRIPT_NAME);
-        let name: String = name
-            .flat_map(|text| text.chars().collect::<Vec<_>>())
-            .collect();
+        let name = name.flat_map(|text| text.chars().collect::<Vec<_>>());
         let is_plain = |c: &char| c.is_ascii_alphanumeric() || *c == '-';
-        format!(
-            "{tag}+{}",
-            name.chars().filter(is_plain).take(60).collect::<String>()
-        )
+        let name: String = name.filter(is_plain).take(60).collect();
+        format!("{tag}+{name}")
     }
 }
 

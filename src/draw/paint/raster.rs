@@ -123,12 +123,10 @@ impl Painter {
         }
         drop(known);
         let tree = Tree::from_str(&text, &self.options).map_err(|e| {
+            let what = format!("the picture of `{}` cannot be drawn: {e}", group.title);
             let hint =
                 "this is a bug in bagreel; please report it with the picture's size and style";
-            Error::usage(
-                format!("the picture of `{}` cannot be drawn: {e}", group.title),
-                hint,
-            )
+            Error::usage(what, hint)
         })?;
         let tiles = Tiles::under(group, scene.size, &self.fonts);
         let page = (sheet.pixels.width, sheet.pixels.height);
@@ -153,16 +151,11 @@ struct PixelSheet {
 impl PixelSheet {
     /// An empty page for the scene.
     fn of(scene: &Scene, scale: f64) -> Result<Self> {
-        let (w, h) = (
-            libm::round(scene.size.w * scale),
-            libm::round(scene.size.h * scale),
-        );
+        let [w, h] = [scene.size.w, scene.size.h].map(|side| libm::round(side * scale));
         if !(w >= 1.0 && h >= 1.0 && w <= MOST_SIDE && h <= MOST_SIDE && w * h <= MOST_PIXELS) {
             let hint = "use a `--size` of at most 65535 per side and 64 million pixels, such as `1920x1080`";
-            return Err(Error::usage(
-                format!("cannot draw a picture of {w} x {h} pixels"),
-                hint,
-            ));
+            let what = format!("cannot draw a picture of {w} x {h} pixels");
+            return Err(Error::usage(what, hint));
         }
         let (width, height) = (cast::to_u32(w), cast::to_u32(h));
         let rgba = opaque(scene.background).repeat(width as usize * height as usize);
@@ -289,11 +282,8 @@ impl GroupPixels {
         #[expect(clippy::cast_precision_loss, reason = "at most 65,535")]
         let moved = scaled(scale).post_translate(-(left as f32), -(top as f32));
         resvg::render(tree, moved, &mut map.as_mut());
-        Some(Self::inked(
-            &map,
-            (left as usize, top as usize),
-            page.0 as usize,
-        ))
+        let corner = (left as usize, top as usize);
+        Some(Self::inked(&map, corner, page.0 as usize))
     }
 
     /// The pixels of `map` that are not transparent; its corner is at this column and row of a page `across`
@@ -302,20 +292,15 @@ impl GroupPixels {
         let (mut runs, mut rgba) = (Vec::new(), Vec::new());
         let rows = map.data().chunks_exact(map.width() as usize * 4);
         for (row, y) in rows.zip(top..) {
-            let mut x = left + y * across;
-            for run in row
-                .as_chunks::<4>()
-                .0
-                .chunk_by(|a, b| (a[3] == 0) == (b[3] == 0))
-            {
+            let mut at = left + y * across;
+            let pixels = row.as_chunks::<4>().0;
+            for run in pixels.chunk_by(|a, b| (a[3] == 0) == (b[3] == 0)) {
+                let length = run.len();
                 if run[0][3] != 0 {
-                    runs.push(Run {
-                        at: x,
-                        length: run.len(),
-                    });
+                    runs.push(Run { at, length });
                     rgba.extend_from_slice(run.as_flattened());
                 }
-                x += run.len();
+                at += length;
             }
         }
         Self { runs, rgba }
@@ -383,9 +368,8 @@ impl<'a> DrawnScene<'a> {
 
     /// The bytes of the pixels that may differ from those of the scene before, from top to bottom.
     pub fn changed(&self) -> impl Iterator<Item = Range<usize>> + use<> {
-        let rows = self
-            .sheet
-            .and_then(|(sheet, dirty)| Some(sheet.rows(dirty?)));
+        let rows = self.sheet;
+        let rows = rows.and_then(|(sheet, dirty)| Some(sheet.rows(dirty?)));
         let all = rows.is_none().then_some(0..self.pixels.rgba.len());
         all.into_iter().chain(rows.into_iter().flatten())
     }
@@ -461,7 +445,14 @@ impl Last {
         let drawn: Vec<_> = drawn.collect::<Result<_>>()?;
         let dirty = self.dirty(&scene, &drawn, &stays);
         match &dirty {
-            Some(dirty) => self.mend(&scene, &drawn, dirty),
+            // The groups that overlap these tiles are drawn, and only these tiles copied.
+            Some(dirty) => {
+                self.scratch.clear(dirty, &scene);
+                for group in drawn.iter().filter(|d| d.tiles.meets(dirty)) {
+                    self.scratch.draw(group);
+                }
+                self.sheet.copy(dirty, &self.scratch);
+            }
             None => self.sheet.cover(&scene, &drawn),
         }
         Ok(Self {
@@ -470,15 +461,6 @@ impl Last {
             dirty,
             ..self
         })
-    }
-
-    /// Draws the groups that overlap these tiles, and copies only these tiles.
-    fn mend(&mut self, scene: &Scene, drawn: &[Arc<RasterGroup>], dirty: &Tiles) {
-        self.scratch.clear(dirty, scene);
-        for group in drawn.iter().filter(|d| d.tiles.meets(dirty)) {
-            self.scratch.draw(group);
-        }
-        self.sheet.copy(dirty, &self.scratch);
     }
 
     /// The index in the previous scene of each group that is equal there.
@@ -548,7 +530,6 @@ impl PixelSheet {
 const SIDE: f64 = 32.0;
 
 /// A set of tiles of one page.
-#[derive(Clone, Debug, PartialEq, Eq)]
 struct Tiles {
     columns: usize,
     rows: usize,

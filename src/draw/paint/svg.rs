@@ -6,6 +6,7 @@
 use std::fmt::{self, Display};
 
 use super::xml::{Xml, hundredth, tenth};
+use crate::base::geometry::Rect;
 use crate::draw::scene::{Anchor, Form, Group, Piece, Scene, Shape, Step, Stroke, Text};
 use crate::draw::style::Color;
 use crate::draw::text::{Fonts, Weight};
@@ -58,18 +59,14 @@ pub(super) fn open(xml: &mut Xml, scene: &Scene) {
         _ => (1.0, ""),
     };
     let [width, height] = [size.w, size.h].map(|side| format!("{}{unit}", tenth(side * scale)));
+    let family = format_args!("{}, Helvetica, Arial, sans-serif", Fonts::FAMILY);
+    let view = format_args!("0 0 {} {}", tenth(size.w), tenth(size.h));
     xml.open("svg")
         .attribute("xmlns", "http://www.w3.org/2000/svg")
         .attribute("width", width)
         .attribute("height", height)
-        .attribute(
-            "viewBox",
-            format_args!("0 0 {} {}", tenth(size.w), tenth(size.h)),
-        )
-        .attribute(
-            "font-family",
-            format_args!("{}, Helvetica, Arial, sans-serif", Fonts::FAMILY),
-        )
+        .attribute("viewBox", view)
+        .attribute("font-family", family)
         .raw("\n");
 }
 
@@ -92,24 +89,8 @@ pub(super) fn write_group(xml: &mut Xml, group: &Group, fonts: Option<&Fonts>) {
 
 fn write_shape(xml: &mut Xml, shape: &Shape) {
     match &shape.form {
-        Form::Rect(rect, radius) => {
-            xml.open("rect")
-                .attribute("x", tenth(rect.x))
-                .attribute("y", tenth(rect.y))
-                .attribute("width", tenth(rect.w))
-                .attribute("height", tenth(rect.h));
-            if *radius > 0.0 {
-                xml.attribute("rx", tenth(*radius));
-            }
-        }
-        Form::Ellipse(rect) => {
-            let centre = rect.centre();
-            xml.open("ellipse")
-                .attribute("cx", tenth(centre.x))
-                .attribute("cy", tenth(centre.y))
-                .attribute("rx", tenth(rect.w / 2.0))
-                .attribute("ry", tenth(rect.h / 2.0));
-        }
+        Form::Rect(rect, radius) => write_rect(xml.open("rect"), rect, *radius),
+        Form::Ellipse(rect) => write_ellipse(xml.open("ellipse"), rect),
         Form::Path(steps) if is_polygon(steps) => {
             xml.open("polygon").attribute("points", Corners(steps));
         }
@@ -120,6 +101,26 @@ fn write_shape(xml: &mut Xml, shape: &Shape) {
     xml.attribute("fill", shape.fill);
     write_stroke(xml, &shape.stroke);
     xml.close_empty();
+}
+
+/// Writes the place of a rectangle, whose corners have this radius.
+pub(super) fn write_rect(xml: &mut Xml, rect: &Rect, radius: f64) {
+    xml.attribute("x", tenth(rect.x))
+        .attribute("y", tenth(rect.y))
+        .attribute("width", tenth(rect.w))
+        .attribute("height", tenth(rect.h));
+    if radius > 0.0 {
+        xml.attribute("rx", tenth(radius));
+    }
+}
+
+/// Writes the place of the ellipse inside a rectangle.
+pub(super) fn write_ellipse(xml: &mut Xml, rect: &Rect) {
+    let centre = rect.centre();
+    xml.attribute("cx", tenth(centre.x))
+        .attribute("cy", tenth(centre.y))
+        .attribute("rx", tenth(rect.w / 2.0))
+        .attribute("ry", tenth(rect.h / 2.0));
 }
 
 /// Whether a path is one closed run of straight lines: heads of arrows and signs, which tools should not

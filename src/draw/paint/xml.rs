@@ -139,7 +139,6 @@ fn escape(out: &mut String, text: &str) {
 }
 
 /// A number in whole units of 1/`parts`, without trailing zeros; 0 for a value that is not finite.
-#[derive(Clone, Copy, Debug)]
 pub(crate) struct Decimal {
     value: f64,
     /// The number of units per 1: 10 or 100.

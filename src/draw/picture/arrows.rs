@@ -1,7 +1,7 @@
 //! Publications and subscriptions: their routes, rates and signs of change.
 
-use super::options::{self, ArrowLook};
-use super::texts::{self, LINE, arrow_label, class, reported};
+use super::options::{self, Paint};
+use super::texts::{self, LINE, arrow_label, class, entries};
 use super::{GraphFit, GraphPen, badge};
 use crate::base::geometry::{Point, Rect, Size, after, on_cubic, polyline};
 use crate::draw::scene::{Anchor, Font, Form, Group, Shape, Step, Stroke, Text, polygon};
@@ -191,19 +191,17 @@ impl GraphPen<'_> {
         shown: &Shown,
         ends: [Option<&Shown>; 2],
     ) -> [Group; 3] {
-        let look = options::of_arrow(self.style, &arrow.kind, shown, shown.steady_hz);
+        let look = options::of_arrow(self.style, &arrow.kind, shown);
         let [from, to] = &track.ends;
         let kind = arrow.kind.word();
         let class = class(&format!("edge {}", arrow.class()), shown);
-        let data = vec![("from", from.clone()), ("to", to.clone())];
+        let is_bundle = arrow.kind == ArrowKind::Bundle;
+        let mut data = vec![("from", from.clone()), ("to", to.clone())];
+        data.extend(entries(&shown.events));
+        data.extend(is_bundle.then(|| ("topics", arrow.topics_in(shown).join(" "))));
         let mut group = Group::new(track.id.clone(), class)
-            .with(reported(data, shown))
+            .with(data)
             .titled(format!("{from} → {to}\n{kind}: {}", texts::facts(shown)));
-        if arrow.kind == ArrowKind::Bundle {
-            group
-                .data
-                .push(("topics", arrow.topics_in(shown).join(" ")));
-        }
         let mut over = Group {
             id: format!("{}..over", group.id),
             ..group.clone()
@@ -220,11 +218,14 @@ impl GraphPen<'_> {
             ArrowKind::Bundle | ArrowKind::Direct(_) if arrow.is_service => Tip::Service,
             _ => Tip::Arrow,
         };
-        if arrow.kind == ArrowKind::Bundle {
-            self.line([&mut glow, &mut group], track, &look, tip, shown.ways());
-            self.rows(&mut over, track, shown, &look);
+        let heads = if is_bundle {
+            shown.ways()
         } else {
-            self.line([&mut glow, &mut group], track, &look, tip, [true, false]);
+            [true, false]
+        };
+        self.line([&mut glow, &mut group], track, &look, tip, heads);
+        if is_bundle {
+            self.rows(&mut over, track, shown, &look);
         }
         // A rate that changed is shown even where there is no space beside the line, unless its topic shows it.
         let is_at_end = ends.into_iter().flatten().any(Shown::has_new_rate);
@@ -252,7 +253,7 @@ impl GraphPen<'_> {
         &self,
         [glow, group]: [&mut Group; 2],
         track: &ArrowPath,
-        look: &ArrowLook,
+        look: &Paint,
         kind: Tip,
         heads: [bool; 2],
     ) {
@@ -301,7 +302,7 @@ impl GraphPen<'_> {
     }
 
     /// The rows of its topics, one below the other.
-    fn rows(&self, group: &mut Group, track: &ArrowPath, shown: &Shown, look: &ArrowLook) {
+    fn rows(&self, group: &mut Group, track: &ArrowPath, shown: &Shown, look: &Paint) {
         let Some(place) = track.label else { return };
         let style = &self.style.edge;
         let scale = self.fit.scale;
@@ -335,7 +336,7 @@ impl GraphPen<'_> {
         is_badge: bool,
         track: &ArrowPath,
         shown: &Shown,
-        look: &ArrowLook,
+        look: &Paint,
     ) {
         let text = self.fonts.shown(text);
         let style = &self.style.edge;
@@ -382,10 +383,8 @@ impl Tip {
         // Back along the line, and to its left.
         let at = |back: f64, left: f64| {
             let (back, left) = (back * length, left * length);
-            Point::new(
-                tip.x - along.x * back - along.y * left,
-                tip.y - along.y * back + along.x * left,
-            )
+            let x = tip.x - along.x * back - along.y * left;
+            Point::new(x, tip.y - along.y * back + along.x * left)
         };
         match self {
             Self::Arrow => polygon(&[tip, at(1.0, 0.38), at(1.0, -0.38)]),

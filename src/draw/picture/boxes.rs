@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::options::{self, BoxLook};
+use super::options::{self, Paint};
 use super::spaces::Space;
 use super::texts::{
     BAR, LINE, Label, ShownRates, TICK, called, class, data, fitted, item_id, rate_label,
@@ -133,7 +133,7 @@ impl GraphPen<'_> {
         item: &Item,
         body: &Body,
         place: Rect,
-        look: &BoxLook,
+        look: &Paint,
     ) -> Rect {
         let stroke = look.stroke.scaled(self.fit.pen);
         let form = self.form(item, body, place);
@@ -209,7 +209,7 @@ impl GraphPen<'_> {
         [first, second]: [&str; 2],
         place: Rect,
         body: &Body,
-        look: &BoxLook,
+        look: &Paint,
     ) {
         let scale = self.fit.scale;
         let middle = place.centre();
@@ -362,10 +362,8 @@ pub(crate) fn cards(view: &View, style: &Style, fonts: &Fonts) -> Vec<Card> {
             card.shorten(view);
         }
         let wide = card.lines.iter().map(|line| line.width(view, style, fonts));
-        card.room = Size::new(
-            wide.fold(0.0, f64::max),
-            style.topic.size * (STEP * card.lines.len() as f64 + 0.4),
-        );
+        let high = style.topic.size * (STEP * card.lines.len() as f64 + 0.4);
+        card.room = Size::new(wide.fold(0.0, f64::max), high);
     }
     cards
 }
@@ -376,17 +374,13 @@ impl Card {
         if self.lines.len() <= MOST_ROWS {
             return;
         }
-        let weight = |line: &Line| {
-            let rows = line.topics.iter().map(|(at, _)| &view.rows[*at]);
+        let weighed = |(at, line): (usize, &Line)| {
+            let mut rows = line.topics.iter().map(|(at, _)| &view.rows[*at]);
             let rates = rows.clone().flat_map(|row| row.shown.distinct());
             let rate = rates.filter_map(|look| look.hz).fold(0.0, f64::max);
-            (rows.clone().any(is_changing), rate)
+            (rows.any(is_changing), rate, at)
         };
-        let mut order: Vec<(bool, f64, usize)> = Vec::new();
-        for (at, line) in self.lines.iter().enumerate() {
-            let (changes, rate) = weight(line);
-            order.push((changes, rate, at));
-        }
+        let mut order: Vec<_> = self.lines.iter().enumerate().map(weighed).collect();
         order.sort_by(|a, b| b.0.cmp(&a.0).then(b.1.total_cmp(&a.1)).then(a.2.cmp(&b.2)));
         let changing = order.iter().filter(|(changes, ..)| *changes).count();
         let listed = order.iter().take(changing.max(MOST_ROWS - 1));
@@ -462,7 +456,7 @@ fn rate(shown: &Shown) -> Option<String> {
 
 impl GraphPen<'_> {
     /// The outline of a card, and its head, which is returned.
-    pub(crate) fn card(&self, group: &mut Group, card: &Card, place: Rect, look: &BoxLook) -> Rect {
+    pub(crate) fn card(&self, group: &mut Group, card: &Card, place: Rect, look: &Paint) -> Rect {
         let (scale, stroke) = (self.fit.scale, look.stroke.scaled(self.fit.pen));
         let radius = self.card_radius();
         let (form, fill) = (Form::Rect(place, radius), self.style.page.background);

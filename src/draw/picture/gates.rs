@@ -37,10 +37,14 @@ pub(crate) fn gates(view: &View) -> Vec<Gate> {
     };
     let found = grouped(view.arrows.with_ids().filter_map(crossing));
     let found = found.into_iter().filter(|(_, members)| members.len() > 1);
+    let windows = u32::try_from(view.frames.len()).unwrap_or(u32::MAX);
     let gate = |((space, _), members): (_, Vec<(ArrowId, bool)>)| {
-        let quiet = |at: ArrowId| {
-            let shown = view.arrows_shown.get(at);
-            shown.map_or(0, |shown| quiet_windows(shown, view.frames.len()))
+        // The number of windows in which it exists without a mark.
+        let quiet = |at: ArrowId| -> u32 {
+            let runs = view.arrows_shown.get(at).into_iter();
+            let runs = runs.flat_map(|shown| shown.spans(windows));
+            let quiet = runs.filter(|(.., look)| is_quiet(look));
+            quiet.map(|(from, to, ..)| to - from).sum()
         };
         let longest = members.iter().rev().max_by_key(|(at, _)| quiet(*at));
         let lead = longest.map_or(ArrowId(0), |(at, _)| *at);
@@ -59,13 +63,6 @@ pub(crate) fn gates(view: &View) -> Vec<Gate> {
         }
     };
     found.map(gate).collect()
-}
-
-/// The number of windows in which an element exists without a mark.
-fn quiet_windows(shown: &ShownRuns, windows: usize) -> u32 {
-    let runs = shown.spans(u32::try_from(windows).unwrap_or(u32::MAX));
-    let quiet = runs.filter(|(.., look)| is_quiet(look));
-    quiet.map(|(from, to, ..)| to - from).sum()
 }
 
 fn is_quiet(shown: &Shown) -> bool {
@@ -97,24 +94,6 @@ impl Gate {
     /// The indices of its lines.
     pub(crate) fn lines(&self) -> impl Iterator<Item = ArrowId> {
         self.members.iter().map(|(at, _)| *at)
-    }
-
-    /// The windows in which one of the lines changes its look.
-    pub(crate) fn turns(&self, view: &View) -> BTreeSet<u32> {
-        let shown = self.members.iter();
-        let shown = shown.filter_map(|(at, _)| view.arrows_shown.get(*at));
-        shown.flat_map(ShownRuns::runs).map(|run| run.0).collect()
-    }
-
-    /// Whether each line is drawn separately in some window.
-    pub(crate) fn alone(&self, view: &View) -> impl Iterator<Item = (ArrowId, bool)> {
-        let changed = |at: ArrowId| {
-            let shown = view.arrows_shown.get(at);
-            shown.is_some_and(|shown| !shown.distinct().iter().all(is_quiet))
-        };
-        let is_lead_changed = changed(self.lead);
-        let all = self.members.iter();
-        all.map(move |(at, _)| (*at, is_lead_changed || changed(*at)))
     }
 
     /// The look of the line for all lines that are unchanged in a window, and these lines; `None` if there
@@ -204,11 +183,14 @@ pub(crate) fn share(
     forks: &ById<ArrowId, Option<usize>>,
 ) {
     for (gate, names) in gates {
-        for (at, is_alone) in gate.alone(view) {
-            rooms[at] = rooms[at].filter(|_| is_alone);
+        // Lines that are drawn separately in some window keep their own.
+        let is_changed = |at: ArrowId| !view.arrows_shown[at].distinct().iter().all(is_quiet);
+        let is_lead_changed = is_changed(gate.lead);
+        for at in gate.lines() {
+            rooms[at] = rooms[at].filter(|_| is_lead_changed || is_changed(at));
         }
         let look = |at: ArrowId, window: u32| view.arrows_shown[at].at(window as usize);
-        for window in gate.turns(view) {
+        for window in ShownRuns::turns(gate.lines().map(|at| &view.arrows_shown[at])) {
             let shown = gate.shown(view, |at| look(at, window));
             let rows = shown.map(|(shown, _)| texts::rows(&shown, names));
             let room = rows.and_then(|rows| texts::room(&rows, fonts, style));

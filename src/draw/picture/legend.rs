@@ -153,7 +153,7 @@ pub(crate) fn legend(
 
 fn draw(group: &mut Group, sign: &LegendSign, style: &Style, place: Rect, unit: f64) {
     let arrow_of = |kind, confidence, mark| {
-        options::of_arrow(style, &kind, &shown(State::Active, confidence, mark), None)
+        options::of_arrow(style, &kind, &shown(State::Active, confidence, mark))
             .stroke
             .scaled(unit)
     };

@@ -17,9 +17,7 @@ use crate::draw::style::{Body, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::graph::{ById, Id as _};
 use crate::layout::{self, Link, Outline, Plan, Vertex};
-use crate::view::{
-    Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Shown, ShownRuns, View, both,
-};
+use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Shown, ShownRuns, View};
 
 /// The largest width of a name in pixels, and in heights of its letters if these are large; longer ones are shortened in
 /// their middle. About 30 letters: of a wider box, a layer of the graph would be mostly space.
@@ -32,13 +30,10 @@ const MOST_OTHERS: usize = 5;
 const FLAT: f64 = 0.7;
 
 /// The labels of a view, and the plan that follows from them.
-#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct MeasuredGraph {
     pub(crate) plan: Plan,
     pub(crate) labels: Vec<Label>,
     pub(crate) spaces: Vec<Space>,
-    /// Whether each arrow carries its rate.
-    pub(crate) rated: Vec<bool>,
     /// The names of the topics of each bundle as drawn; none for other arrows.
     pub(crate) topics: Vec<Vec<String>>,
     /// The lines of namespaces that are drawn as one, with the names of their topics.
@@ -60,15 +55,16 @@ impl MeasuredGraph {
         let mut vertices = Vec::new();
         let mut cards = boxes::cards(view, style, fonts);
         for (at, item) in view.items.iter().enumerate() {
-            let inside = item
-                .cluster
-                .and_then(|c| spaces.get(c))
-                .map_or("", |space| space.name.as_str());
+            let inside = item.cluster.and_then(|c| spaces.get(c));
+            let inside = inside.map_or("", |space| space.name.as_str());
             let mut label = drafter.label(item, inside, seconds[at].is_some());
             let presence = view.presences.get(ItemId::of(at));
             label.has_bar = presence.is_some_and(|presence| !presence.times.is_empty());
             let has_rows = cards[at].room.h > 0.0;
-            let first = drafter.longest_line(ItemId::of(at), &label);
+            let looks = view.items_shown.get(ItemId::of(at));
+            let looks = looks.map_or(&[][..], ShownRuns::distinct).iter();
+            let unlined = looks.map(|look| look.unlined.len()).max().unwrap_or(0);
+            let first = counting(&label.name, label.counted + unlined);
             let second = seconds[at].unwrap_or(0.0);
             let mut size = drafter.size(item, &label, (&first, second), has_rows);
             if has_rows {
@@ -108,15 +104,12 @@ impl MeasuredGraph {
             fork: *fork,
             is_outside: through.contains(&id),
         });
-        let clusters = view
-            .namespaces
-            .iter()
-            .zip(&spaces)
-            .map(|(namespace, space)| layout::Cluster {
-                parent: namespace.parent,
-                title: drafter.title(space),
-                footer: Size::default(),
-            });
+        let clusters = view.namespaces.iter().zip(&spaces);
+        let clusters = clusters.map(|(namespace, space)| layout::Cluster {
+            parent: namespace.parent,
+            title: drafter.title(space),
+            footer: Size::default(),
+        });
         let mut clusters: Vec<layout::Cluster> = clusters.collect();
         let footers = spaces::footers(view, style, fonts);
         for footer in &footers {
@@ -139,12 +132,10 @@ impl MeasuredGraph {
                 is_direct && room.is_some()
             }),
         };
-        let rated = rooms.iter().map(Option::is_some).collect();
         Self {
             plan,
             labels,
             spaces,
-            rated,
             topics,
             gates,
             cards,
@@ -225,14 +216,6 @@ impl Measurer<'_> {
         }
     }
 
-    /// The longest first line of a box.
-    fn longest_line(&self, id: ItemId, label: &Label) -> String {
-        let looks = self.view.items_shown.get(id);
-        let looks = looks.map_or(&[][..], ShownRuns::distinct).iter();
-        let unlined = looks.map(|look| look.unlined.len()).max();
-        counting(&label.name, label.counted + unlined.unwrap_or(0))
-    }
-
     /// The size of a box with this label, whose longest first line is `first` and whose changing smaller lines are at most
     /// `second` wide; for one with rows, that of the part above them.
     fn size(
@@ -259,10 +242,8 @@ impl Measurer<'_> {
             ItemKind::Topic => 0.0,
             ItemKind::Group | ItemKind::Namespace => self.style.stack.depth,
         };
-        Size::new(
-            width + 2.0 * body.pad_x + depth,
-            height + 2.0 * body.pad_y + depth,
-        )
+        let (x, y) = (2.0 * body.pad_x, 2.0 * body.pad_y);
+        Size::new(width + x + depth, height + y + depth)
     }
 
     /// The width of the widest smaller line that each box shows in some window: lifecycle states and rates.
@@ -306,11 +287,10 @@ impl Measurer<'_> {
             // A subscription shows its rate if its topic has another.
             let topic = self.view.items_shown.get(arrow.from);
             let topic = topic.filter(|_| is_reported && arrow.kind == ArrowKind::Subscribe);
-            let looks = both(
-                if is_reported { looks } else { &nothing },
-                topic.unwrap_or(&nothing),
-            );
-            for (shown, topic) in looks {
+            let looks = if is_reported { looks } else { &nothing };
+            let both = [looks, topic.unwrap_or(&nothing)];
+            for window in ShownRuns::turns(both.into_iter()) {
+                let [shown, topic] = both.map(|looks| looks.at(window as usize));
                 let label = shown.and_then(|shown| arrow_label(arrow, shown, topic));
                 let Some((text, is_badge)) = label else {
                     continue;

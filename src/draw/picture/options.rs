@@ -11,26 +11,16 @@ use crate::evidence::Confidence;
 use crate::graph::State;
 use crate::view::{Arrow, ArrowKind, Frame, ItemId, ItemKind, Mark, SeenWindow, Shown, ShownRuns};
 
-/// The paint of a box.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct BoxLook {
+/// The paint of a box or an arrow.
+pub(crate) struct Paint {
     pub(crate) fill: Color,
     pub(crate) stroke: Stroke,
     pub(crate) text: Color,
-    /// The smaller line.
+    /// The smaller line of a box.
     pub(crate) small: (Weight, Color),
-    /// A glow around it, to draw attention.
-    pub(crate) glow: Color,
-}
-
-/// The paint of an arrow.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct ArrowLook {
-    pub(crate) stroke: Stroke,
-    pub(crate) text: Color,
-    /// Whether it begins with a dot: active through a latched message.
+    /// Whether an arrow begins with a dot: active through a latched message.
     pub(crate) dot: bool,
-    /// A glow around it.
+    /// A glow around it, to draw attention.
     pub(crate) glow: Color,
 }
 
@@ -61,32 +51,39 @@ pub(crate) fn body(style: &Style, kind: ItemKind) -> &Body {
 }
 
 /// The paint of a box.
-pub(crate) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
-    if let Some(quiet) = quiet(style, shown) {
-        return BoxLook {
-            fill: quiet.fill,
-            stroke: Stroke::dashed(quiet.stroke, quiet.width, &quiet.dash),
-            text: quiet.text,
-            small: (Weight::Regular, quiet.text),
-            glow: Color::NONE,
-        };
-    }
-    if let Some(mark) = shown.mark {
-        let change = change(style, mark);
-        return BoxLook {
-            fill: change.fill,
-            stroke: Stroke::dashed(change.color, change.width, &change.dash),
-            text: change.text,
-            small: (Weight::SemiBold, change.color),
-            glow: glow(change, shown),
-        };
-    }
-    BoxLook {
+pub(crate) fn of_box(style: &Style, body: &Body, shown: &Shown) -> Paint {
+    let plain = Paint {
         fill: body.fill,
         stroke: Stroke::dashed(body.stroke, body.width, dash(style, shown)),
         text: body.text,
         small: (Weight::Regular, style.page.quiet),
+        dot: false,
         glow: Color::NONE,
+    };
+    paint(style, shown, plain)
+}
+
+/// The paint of what would be `plain` without a change and with activity of its own.
+fn paint(style: &Style, shown: &Shown, plain: Paint) -> Paint {
+    if let Some(quiet) = quiet(style, shown) {
+        return Paint {
+            fill: quiet.fill,
+            stroke: Stroke::dashed(quiet.stroke, quiet.width, &quiet.dash),
+            text: quiet.text,
+            small: (Weight::Regular, quiet.text),
+            dot: false,
+            ..plain
+        };
+    }
+    let Some(mark) = shown.mark else { return plain };
+    let change = change(style, mark);
+    Paint {
+        fill: change.fill,
+        stroke: Stroke::dashed(change.color, change.width, &change.dash),
+        text: change.text,
+        small: (Weight::SemiBold, change.color),
+        glow: glow(change, shown),
+        ..plain
     }
 }
 
@@ -109,50 +106,34 @@ fn dash<'a>(style: &'a Style, shown: &Shown) -> &'a [f64] {
     }
 }
 
-/// The paint of an arrow over which `flow` messages or kilobytes flow each second.
-pub(crate) fn of_arrow(
-    style: &Style,
-    kind: &ArrowKind,
-    shown: &Shown,
-    flow: Option<f64>,
-) -> ArrowLook {
+/// The paint of an arrow.
+pub(crate) fn of_arrow(style: &Style, kind: &ArrowKind, shown: &Shown) -> Paint {
     let edge = &style.edge;
-    let latched = shown.state == State::Latched;
-    if let Some(quiet) = quiet(style, shown) {
-        return ArrowLook {
-            stroke: Stroke::dashed(quiet.stroke, quiet.width, &quiet.dash),
-            text: quiet.text,
-            dot: false,
-            glow: Color::NONE,
-        };
-    }
-    if let Some(mark) = shown.mark {
-        let change = change(style, mark);
-        // The style's width is that of a box; a line between boxes is noticed with two thirds of it.
-        let width = match mark {
-            // A full line in this color would stand out more than one that is there.
-            Mark::Removed => change.width * 0.8,
-            // As wide as its rate requires, but never narrower than a visible change.
-            _ => (change.width * 0.65).max(width_of(style, flow)),
-        };
-        return ArrowLook {
-            stroke: Stroke::dashed(change.color, width, &change.dash),
-            text: change.text,
-            dot: latched,
-            glow: glow(change, shown),
-        };
-    }
+    let by_rate = width_of(style, shown.steady_hz);
     let known = shown.steady_hz.is_some() || *kind == ArrowKind::Publish;
     let width = match shown.confidence {
         Confidence::Stated if !known => style.stated.width,
-        _ => width_of(style, flow),
+        _ => by_rate,
     };
-    ArrowLook {
+    let plain = Paint {
+        fill: Color::NONE,
         stroke: Stroke::dashed(edge.stroke, width, dash(style, shown)),
         text: edge.text,
-        dot: latched,
+        small: (Weight::Regular, edge.text),
+        dot: shown.state == State::Latched,
         glow: Color::NONE,
+    };
+    let mut paint = paint(style, shown, plain);
+    // The style's width of a change is that of a box; a line between boxes is noticed with two thirds of it.
+    let width = &mut paint.stroke.width;
+    match shown.mark {
+        None | Some(Mark::Away) => {}
+        // A full line in this color would stand out more than one that is there.
+        Some(Mark::Removed) => *width *= 0.8,
+        // As wide as its rate requires, but never narrower than a visible change.
+        Some(_) => *width = (*width * 0.65).max(by_rate),
     }
+    paint
 }
 
 /// The width of an arrow: thicker for higher rates, by their logarithm.
@@ -191,10 +172,8 @@ impl<'a> Spotlight<'a> {
         let changed = seen.items.iter().filter(|shown| is_news(shown));
         let is_new = |looks: &ShownRuns| looks.at(k).is_some_and(is_news);
         let rows = view.rows.iter().filter(|row| is_new(&row.shown));
-        let news: BTreeSet<ItemId> = changed
-            .map(Shown::item)
-            .chain(rows.map(|r| r.owner))
-            .collect();
+        let rows = rows.map(|row| row.owner);
+        let news: BTreeSet<ItemId> = changed.map(Shown::item).chain(rows).collect();
         let mut spot = Self {
             style: measured.style,
             lit: news.clone(),
@@ -245,9 +224,7 @@ mod tests {
         let style = Style::builtin("light").unwrap();
         let width = |hz| {
             let shown = shown(State::Active, Confidence::Measured, None, hz);
-            of_arrow(&style, &ArrowKind::Publish, &shown, Some(hz))
-                .stroke
-                .width
+            of_arrow(&style, &ArrowKind::Publish, &shown).stroke.width
         };
         assert!(width(0.0) < width(1.0) && width(1.0) < width(50.0) && width(50.0) < width(1e3));
         assert!(width(1e300) <= style.edge.most && width(f64::NAN) <= width(0.0));

@@ -27,11 +27,9 @@ pub(super) fn place_titles(
     let pieces = lines.iter().flat_map(|line| line.windows(2));
     let pieces = pieces.filter_map(|ends| Rect::of_points(ends.iter().copied()));
     let borders = titles.iter().flat_map(|(frame, ..)| border(frame));
-    let mut taken: Vec<Rect> = pieces
-        .chain(borders)
-        .chain(few.iter().filter_map(ArrowPath::label_area))
-        .chain(cards.iter().map(|card| card.place))
-        .collect();
+    let labels = few.iter().filter_map(ArrowPath::label_area);
+    let boxes = cards.iter().map(|card| card.place);
+    let mut taken: Vec<Rect> = pieces.chain(borders).chain(labels).chain(boxes).collect();
     taken.sort_by(|a, b| a.x.total_cmp(&b.x));
     let placed = titles.iter().map(|&(frame, size, has_footer)| {
         let (left, right) = (frame.x + INSET * scale, frame.right() - INSET * scale);
@@ -109,12 +107,9 @@ impl Room {
             let points = track.points();
             (around(&points), points)
         };
+        let labels = tracks.iter().filter_map(ArrowPath::label_area);
         Self {
-            boxes: cards
-                .iter()
-                .map(|card| card.place)
-                .chain(tracks.iter().filter_map(ArrowPath::label_area))
-                .collect(),
+            boxes: cards.iter().map(|card| card.place).chain(labels).collect(),
             lines: tracks.iter().map(line).collect(),
             radius,
         }

@@ -13,7 +13,6 @@ use crate::draw::text::{Fonts, Weight};
 use crate::view::{AlsoHere, Item, Mark, MemberState, Namespace, Shown, View};
 
 /// A namespace with a box around its members.
-#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Space {
     /// Its full name.
     pub(crate) name: String,
@@ -108,16 +107,12 @@ impl GraphPen<'_> {
     /// The badge of one namespace.
     fn member(&self, group: &mut Group, index: &str, who: MemberState, area: Rect) {
         let (style, scale) = (self.style, self.fit.scale);
-        let (fill, color, text) = match who {
-            MemberState::Here => (style.node.fill, style.node.stroke, style.node.text),
-            MemberState::Away => (Color::NONE, style.silent.stroke, style.silent.text),
-            MemberState::Joined => (style.added.fill, style.added.color, style.added.text),
-            MemberState::Left => (style.removed.fill, style.removed.color, style.removed.text),
-        };
-        let dash = match who {
-            MemberState::Here | MemberState::Joined => &[][..],
-            MemberState::Away => &style.silent.dash,
-            MemberState::Left => &style.removed.dash,
+        let (here, away, joined, left) = (&style.node, &style.silent, &style.added, &style.removed);
+        let (fill, color, text, dash) = match who {
+            MemberState::Here => (here.fill, here.stroke, here.text, &[][..]),
+            MemberState::Away => (Color::NONE, away.stroke, away.text, &away.dash[..]),
+            MemberState::Joined => (joined.fill, joined.color, joined.text, &[][..]),
+            MemberState::Left => (left.fill, left.color, left.text, &left.dash[..]),
         };
         let stroke = Stroke::dashed(color, 1.0, dash).scaled(self.fit.pen);
         let form = Form::Rect(area, 3.0 * scale);
@@ -141,7 +136,6 @@ const FIRST: &str = "also here:";
 pub(crate) const MOST_LISTED: usize = 60;
 
 /// The words for the nodes of one namespace.
-#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Footer {
     /// The namespace: an index into the view's; `None` for the words outside of all.
     pub(crate) cluster: Option<usize>,
@@ -238,6 +232,15 @@ fn broken(words: &[String], fonts: &Fonts, size: f64, most: f64) -> Vec<Point> {
     words.iter().map(place).collect()
 }
 
+impl Footer {
+    /// The distance of its words from the frame of this width, and the place of each.
+    fn broken(&self, words: &[String], fonts: &Fonts, size: f64, wide: f64) -> (f64, Vec<Point>) {
+        let inset = if self.cluster.is_some() { INSET } else { 0.0 };
+        let most = (wide - 2.0 * inset).max(self.room.w) + 0.1;
+        (inset, broken(words, fonts, size, most))
+    }
+}
+
 /// Whether these words name something that changed.
 pub(crate) fn is_news(words: &Group) -> bool {
     words.data.iter().any(|(key, _)| *key == "entries")
@@ -247,10 +250,8 @@ impl GraphPen<'_> {
     /// The introductory words and the names of a footer for drawings of all windows, each with its rectangle.
     pub(crate) fn footer_words(&self, footer: &Footer, place: Rect) -> Vec<(String, Rect)> {
         let size = self.style.edge.size;
-        let inset = if footer.cluster.is_some() { INSET } else { 0.0 };
         let words = words(footer.names.iter().cloned(), 0);
-        let most = (place.w - 2.0 * inset).max(footer.room.w) + 0.1;
-        let places = broken(&words, self.fonts, size, most);
+        let (inset, places) = footer.broken(&words, self.fonts, size, place.w);
         let last = places.last().map_or(0.0, |at| at.y);
         let bottom = place.bottom() - inset * 0.8;
         let rect = |(word, at): (String, Point)| {
@@ -273,7 +274,6 @@ impl GraphPen<'_> {
         k: usize,
     ) -> Option<Group> {
         let (style, scale) = (&self.style.edge, self.fit.scale);
-        let inset = if footer.cluster.is_some() { INSET } else { 0.0 };
         let seen = also.items.iter().zip(&also.shown).zip(&footer.names);
         let seen: Vec<_> = seen
             .filter_map(|((item, shown), name)| Some((item, view.seen_at(shown, k)?, name)))
@@ -284,19 +284,14 @@ impl GraphPen<'_> {
             said(item, shown, short)
         });
         let words = words(texts, seen.len() - listed.len());
-        let most = (place.w - 2.0 * inset).max(footer.room.w) + 0.1;
-        let places = broken(&words, self.fonts, style.size, most);
+        let (inset, places) = footer.broken(&words, self.fonts, style.size, place.w);
         let place = self.fit.rect(place);
         let (size, step) = (style.size * scale, style.size * LINE * scale);
         let last = places.last()?.y;
         let names: Vec<&str> = seen.iter().map(|(item, ..)| &*item.name).collect();
         let mut data = vec![("names", names.join(" "))];
         let events = seen.iter().flat_map(|(_, shown, _)| &shown.events);
-        let events: BTreeSet<_> = events.collect();
-        if !events.is_empty() {
-            let places: Vec<String> = events.iter().map(ToString::to_string).collect();
-            data.push(("entries", places.join(" ")));
-        }
+        data.extend(texts::entries(events.collect::<BTreeSet<_>>()));
         let number = footer.cluster.map_or_else(String::new, |at| at.to_string());
         let mut group = Group::new(format!("also{number}"), "also")
             .with(data)

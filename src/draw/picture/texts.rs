@@ -12,6 +12,7 @@ use crate::base::words::{self, count, counted, rate, rate_of, rates};
 use crate::draw::style::{Body, Edge};
 use crate::draw::text::{Fonts, Weight};
 use crate::graph::{ById, State};
+use crate::mission::EventId;
 use crate::view::{Arrow, ArrowKind, Counts, Item, ItemId, ItemKind, Mark, Shown, TopicRow, View};
 
 /// The texts of the badges for beginnings, ends and other changes, each with the number of headlines it
@@ -32,12 +33,11 @@ pub(crate) fn change_counts(counts: &Counts) -> [(String, usize); 3] {
 
 /// The text of one badge, from the numbers of nodes, topics and edges: `+1 node +2 topics`.
 fn change_count(sign: char, numbers: [usize; 3]) -> String {
-    let mut parts = Vec::new();
-    for (n, word) in numbers.into_iter().zip(["node", "topic", "edge"]) {
-        if n > 0 {
-            parts.push(format!("{sign}{}", count(n, word)));
-        }
-    }
+    let parts = numbers.into_iter().zip(["node", "topic", "edge"]);
+    let parts = parts.filter(|(n, _)| *n > 0);
+    let parts: Vec<String> = parts
+        .map(|(n, word)| format!("{sign}{}", count(n, word)))
+        .collect();
     parts.join(" ")
 }
 
@@ -173,12 +173,8 @@ pub(crate) struct Label {
 impl Label {
     /// The height of all its lines in pixels before scaling, with the bar below them.
     pub(crate) fn height(&self, body: &Body) -> f64 {
-        let bar = if self.has_bar {
-            body.size * BAR * TICK
-        } else {
-            0.0
-        };
-        self.lines(body) + bar
+        let bar = self.has_bar.then_some(body.size * BAR * TICK);
+        self.lines(body) + bar.unwrap_or(0.0)
     }
 
     /// The first line in a window.
@@ -370,19 +366,16 @@ pub(crate) fn data(item: &Item, shown: &Shown) -> Vec<(&'static str, String)> {
     }
     let members = shown.members.number();
     data.extend(members.map(|(number, _)| ("members", number.to_string())));
-    reported(data, shown)
+    data.extend(entries(&shown.events));
+    data
 }
 
-/// The attributes of an element, with the log indices of its headlines in this window.
-pub(crate) fn reported(
-    mut data: Vec<(&'static str, String)>,
-    shown: &Shown,
-) -> Vec<(&'static str, String)> {
-    if !shown.events.is_empty() {
-        let places: Vec<String> = shown.events.iter().map(ToString::to_string).collect();
-        data.push(("entries", places.join(" ")));
-    }
-    data
+/// The attribute with the events of the log, if there are any.
+pub(crate) fn entries<'a>(
+    events: impl IntoIterator<Item = &'a EventId>,
+) -> Option<(&'static str, String)> {
+    let all: Vec<String> = events.into_iter().map(ToString::to_string).collect();
+    (!all.is_empty()).then(|| ("entries", all.join(" ")))
 }
 
 /// The class words of an element, `node added active measured`: its kind, its mark, its state, its confidence.
@@ -446,19 +439,18 @@ impl Row {
     /// The words with direction signs, for a line that is closer to vertical or not, and runs down or to the
     /// right or not.
     pub(crate) fn words(&self, is_upright: bool, is_forward: bool) -> String {
-        let [on, back] = if is_forward {
-            self.ways
-        } else {
-            [self.ways[1], self.ways[0]]
-        };
-        let signs = match (on, back, is_upright) {
-            (true, true, true) => "↑↓ ",
-            (true, true, false) => "←→ ",
-            (true, false, true) => "↓ ",
-            (true, false, false) => "→ ",
-            (false, true, true) => "↑ ",
-            (false, true, false) => "← ",
-            (false, false, _) => "",
+        let mut ways = self.ways;
+        if !is_forward {
+            ways.reverse();
+        }
+        let signs = match (ways, is_upright) {
+            ([true, true], true) => "↑↓ ",
+            ([true, true], false) => "←→ ",
+            ([true, false], true) => "↓ ",
+            ([true, false], false) => "→ ",
+            ([false, true], true) => "↑ ",
+            ([false, true], false) => "← ",
+            ([false, false], _) => "",
         };
         format!("{signs}{}", self.text)
     }
@@ -473,12 +465,9 @@ pub(crate) fn names(view: &View, arrow: &Arrow) -> Vec<String> {
         rest.unwrap_or(name).to_owned()
     };
     let plain: Vec<String> = arrow.topics.iter().map(plain).collect();
-    let forms: Vec<[&str; 3]> = arrow
-        .topics
-        .iter()
-        .zip(&plain)
-        .map(|(whole, plain)| [last(plain), relative(view, arrow, plain), whole])
-        .collect();
+    let forms = arrow.topics.iter().zip(&plain);
+    let forms = forms.map(|(whole, plain)| [last(plain), relative(view, arrow, plain), &**whole]);
+    let forms: Vec<[&str; 3]> = forms.collect();
     let is_alone = |at: usize, form: usize| {
         let same = forms.iter().filter(|other| other[form] == forms[at][form]);
         same.count() == 1
@@ -526,30 +515,19 @@ pub(crate) fn rows(shown: &Shown, names: &[String]) -> Vec<Row> {
     let is_whole = shown.is_ghost();
     let mut rows: Vec<Row> = Vec::new();
     for row in shown.by_rate().take(most) {
-        let name = names.get(row.topic as usize).map_or("", String::as_str);
-        let name = &*if row.is_service {
-            called(name)
-        } else {
-            name.to_owned()
-        };
+        let mut name = names.get(row.topic as usize).cloned().unwrap_or_default();
+        if row.is_service {
+            name = called(&name);
+        }
         let rate = rate_of_topic(row).filter(|_| !is_whole && row.mark != Some(Mark::Removed));
-        let is_split = rate
-            .as_ref()
-            .is_some_and(|rate| name.len() + rate.len() >= LONGEST);
-        let (text, below) = match rate {
-            None => (name.to_owned(), None),
-            Some(rate) if is_split => (name.to_owned(), Some(rate)),
-            Some(rate) => (format!("{name} {rate}"), None),
+        let lines = match rate {
+            None => vec![name],
+            Some(rate) if name.len() + rate.len() >= LONGEST => vec![name, rate],
+            Some(rate) => vec![format!("{name} {rate}")],
         };
         let has_signs = both || row.ways == [true, true];
-        let ways = if has_signs { row.ways } else { [false; 2] };
-        rows.push(Row {
-            ways,
-            text,
-            mark: row.mark,
-        });
-        rows.extend(below.map(|text| Row {
-            ways: [false, false],
+        rows.extend(lines.into_iter().enumerate().map(|(line, text)| Row {
+            ways: row.ways.map(|way| way && has_signs && line == 0),
             text,
             mark: row.mark,
         }));

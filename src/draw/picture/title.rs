@@ -3,7 +3,7 @@
 use super::{PageFrame, PageOptions};
 use crate::base::geometry::Point;
 use crate::base::words;
-use crate::draw::scene::{Anchor, Form, Group, Shape, Stroke, Text, line};
+use crate::draw::scene::{Anchor, Font, Form, Group, Shape, Stroke, Text, line};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::view::{BETWEEN_PHRASES, Frame, View, Words, joined};
@@ -225,10 +225,9 @@ impl<'a> Title<'a> {
         }
         let below = self.cut(&parts.join(NOTES), small, Weight::Regular, most);
         let all = self.page.title.w - 2.0 * self.left() - GAP * unit;
-        let room = (
-            (all - self.width(&time, size, Weight::SemiBold)).max(1.0),
-            (all - self.width(&below, small, Weight::Regular)).max(1.0),
-        );
+        let first = self.width(&time, size, Weight::SemiBold);
+        let second = self.width(&below, small, Weight::Regular);
+        let room = ((all - first).max(1.0), (all - second).max(1.0));
         let right = |text: Text| Text {
             at: Point::new(self.page.title.right() - self.left(), text.at.y),
             anchor: Anchor::End,
@@ -261,15 +260,8 @@ impl<'a> Title<'a> {
     /// A text from `at` on, whose height is a part of the bar's.
     fn text(&self, text: String, at: Point, font: (f64, Weight), color: Color) -> Text {
         let bar = self.page.title;
-        Text {
-            at: Point::new(at.x, bar.y + bar.h * at.y),
-            anchor: Anchor::Start,
-            size: font.0,
-            weight: font.1,
-            color,
-            halo: None,
-            text,
-        }
+        let at = Point::new(at.x, bar.y + bar.h * at.y);
+        Text::new(Anchor::Start, at, Font::new(font.0, font.1, color), text)
     }
 }
 

@@ -218,10 +218,8 @@ impl Picture<'_> {
             for ((word, rect), item) in words.zip(&also.items) {
                 around = around.union(&rect);
                 if let Some(at) = items.get(&(item.kind, &*item.name)) {
-                    let looks = whole
-                        .items_shown
-                        .get(ItemId::of(*at))
-                        .map_or(&[][..], ShownRuns::distinct);
+                    let looks = whole.items_shown.get(ItemId::of(*at));
+                    let looks = looks.map_or(&[][..], ShownRuns::distinct);
                     union.items[*at] = UnionElement {
                         group: self.word(word, rect),
                         rect,
@@ -260,9 +258,6 @@ fn indices(drawn: &ById<ArrowId, bool>, is_drawn: bool) -> impl Iterator<Item = 
 fn spread(elements: Vec<UnionElement>, drawn: &[bool]) -> Vec<UnionElement> {
     let mut elements = elements.into_iter();
     let element = |drawn: &bool| drawn.then(|| elements.next()).flatten();
-    drawn
-        .iter()
-        .map(element)
-        .map(Option::unwrap_or_default)
-        .collect()
+    let elements = drawn.iter().map(element);
+    elements.map(Option::unwrap_or_default).collect()
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use super::*;
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
+use crate::draw::scene::Piece;
 use crate::evidence::Confidence;
 use crate::graph::{Element, Elements, NodeId, State};
 use crate::layout;

@@ -77,10 +77,8 @@ impl<'a> Below<'a> {
         mut timeline: Timeline,
     ) -> Self {
         let scale = sizes.scale();
-        let span = Span::new(
-            view.frames.first().map_or(Stamp(0), |f| f.span.start),
-            view.frames.last().map_or(Stamp(1), |f| f.span.end),
-        );
+        let start = view.frames.first().map_or(Stamp(0), |f| f.span.start);
+        let end = view.frames.last().map_or(Stamp(1), |f| f.span.end);
         let pitch = sizes.pitch(&timeline);
         let margin = sizes.style.page.margin * sizes.unit / scale;
         let wide = strip.w / scale - 2.0 * margin;
@@ -89,7 +87,7 @@ impl<'a> Below<'a> {
         } else if timeline.rows.is_empty() {
             timeline.rows = vec![messages(view, wide * scale)];
         }
-        timeline.span = span;
+        timeline.span = Span::new(start, end);
         let canvas = PaperCanvas::new(fonts, Sizes::SCREEN, scale);
         let place = Rect::new(margin, (strip.y + AROUND * sizes.unit) / scale, wide, 0.0);
         let mut drawer = Drawer::new(timeline, Density::Frame, &canvas, place);

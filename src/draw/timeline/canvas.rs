@@ -73,13 +73,10 @@ pub(crate) struct Sizes {
 
 impl Sizes {
     /// The sizes on a screen, where the scale of the canvas determines those in pixels.
-    pub(crate) const SCREEN: Self = Self {
-        name: 7.0,
-        small: 6.0,
-    };
+    pub(crate) const SCREEN: Self = Self::of_names(7.0);
 
     /// The sizes with names of `names` points (at least 7) and all other text one point smaller.
-    pub(crate) fn of_names(names: f64) -> Self {
+    pub(crate) const fn of_names(names: f64) -> Self {
         Self {
             name: names,
             small: names - 1.0,

@@ -49,7 +49,6 @@ pub(crate) enum Density {
 }
 
 /// The time axis: a line from `left` to `right`, in millimetres.
-#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Axis {
     pub(crate) left: f64,
     pub(crate) right: f64,
@@ -146,7 +145,6 @@ pub(crate) fn fitting(names: &[String], most: usize, fits: impl Fn(&str) -> bool
 }
 
 /// A timeline at its place on a canvas; all lengths in millimetres.
-#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Drawer {
     pub(crate) timeline: Timeline,
     pub(crate) density: Density,

@@ -220,10 +220,8 @@ pub(crate) fn title(source: &FigureSource<'_>, k: usize) -> String {
     let is_said = source.is_named || phase.is_ramp;
     let name = is_said.then(|| format!("{} ", phase.name));
     let again = phase.same_as.map(|k| format!(" as {}", k + 1));
-    [name, Some(format!("({counts})")), again]
-        .into_iter()
-        .flatten()
-        .collect()
+    let [name, again] = [name, again].map(Option::unwrap_or_default);
+    format!("{name}({counts}){again}")
 }
 
 /// Draws the titles of the phases as running text from `y` on; returns the y at which they end.

@@ -474,10 +474,7 @@ impl Row {
         self.labels.extend(other.labels);
         self.lives.extend(other.lives);
         self.bars.extend(other.bars);
-        self.hz = [self.hz, other.hz]
-            .into_iter()
-            .flatten()
-            .reduce(|a, b| a + b);
+        self.hz = self.hz.into_iter().chain(other.hz).reduce(|a, b| a + b);
         (self.topic, self.beside) = (None, <[Vec<String>; 2]>::default());
         let (turns, dots): (Vec<RowMark>, Vec<RowMark>) =
             other.marks.into_iter().partition(RowMark::is_turn);

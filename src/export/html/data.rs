@@ -19,7 +19,7 @@ use crate::draw::timeline::marks::{RowMark, Sign};
 use crate::draw::timeline::rows::{Level, Row};
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::Sender;
-use crate::graph::{Element, Elements, Id as _, Node, NodeId, State};
+use crate::graph::{Element, Elements, Id as _, Node, NodeId};
 use crate::mission::info::is_ros1;
 use crate::mission::{EventId, Mission};
 use crate::view::{Arrow, ArrowKind, Item, Mark, Shown, ShownRuns, TopicRow, View};
@@ -105,7 +105,7 @@ pub(super) fn json(page: &HtmlPage<'_>, still: usize, changes: &PageChanges) -> 
     let mission = page.sequence.mission;
     let frames = &whole.view.frames;
     let (clock, places) = (changes.clock, &changes.places);
-    let mut words = ValueTable::default();
+    let mut words = TextTable::default();
     let graphs = page.drawn();
     let graphs = graphs.map(|drawn| graph(page, drawn, places, clock, &mut words));
     let graphs = graphs.collect();
@@ -113,7 +113,7 @@ pub(super) fn json(page: &HtmlPage<'_>, still: usize, changes: &PageChanges) -> 
     let lives = changes.lives.as_ref();
     let data = PageData {
         graphs,
-        words: words.list(Clone::clone),
+        words: words.list(),
         starts: frames.iter().map(|f| clock.secs(f.span.start)).collect(),
         ends: frames.iter().map(|f| clock.secs(f.span.end)).collect(),
         epoch: clock.0.0.div_euclid(1_000_000),
@@ -146,15 +146,14 @@ fn graph<'a>(
     drawn: &'a PageGraph<'_>,
     places: &BTreeMap<Element, u32>,
     clock: PageClock,
-    words: &mut ValueTable<String>,
+    words: &mut TextTable,
 ) -> GraphData<'a> {
     let (view, runs) = (drawn.view, &drawn.runs);
     let order = || drawn.order.iter().map(|id| &view.arrows[*id]);
     let of_items = view.items.iter().map(|i| (&i.members, true));
     let of_arrows = order().map(|a| (&a.members, false));
-    let facts = of_items
-        .chain(of_arrows)
-        .map(|(members, is_item)| facts_of(page, members, clock, is_item, words));
+    let all = of_items.chain(of_arrows);
+    let facts = all.map(|(members, is_item)| facts_of(page, members, clock, is_item, words));
     let members = |item: &Item| -> Vec<u32> {
         let places = item.members.iter().filter_map(|m| places.get(m).copied());
         let places: BTreeSet<u32> = places.collect();
@@ -167,10 +166,8 @@ fn graph<'a>(
         };
         (arrow.from.0, arrow.to.0, carried)
     };
-    let names = view
-        .items
-        .iter()
-        .map(|item| visible(&item.name).into_owned());
+    let names = view.items.iter();
+    let names = names.map(|item| visible(&item.name).into_owned());
     let of_lines = drawn.order.iter().map(|id| &runs.arrows[id.at()]);
     GraphData {
         facts: facts.collect(),
@@ -205,10 +202,9 @@ fn rows(timeline: &Timeline, changes: &PageChanges) -> Vec<RowData> {
     let row = |row: &Row| {
         let place = row.what().and_then(|what| changes.places.get(&what));
         let is_inferred = f64::from(u8::from(row.is_inferred));
-        let lives = row
-            .lives
-            .iter()
-            .flat_map(|life| [clock.secs(life.start), clock.secs(life.end), is_inferred]);
+        let lives = row.lives.iter();
+        let lives =
+            lives.flat_map(|life| [clock.secs(life.start), clock.secs(life.end), is_inferred]);
         let marks = row.marks.iter().filter_map(|mark| {
             let sign = match mark.sign {
                 Sign::Start => 0,
@@ -302,16 +298,15 @@ fn facts_of(
     members: &[Element],
     clock: PageClock,
     is_item: bool,
-    words: &mut ValueTable<String>,
+    words: &mut TextTable,
 ) -> Vec<u32> {
     let elements = &page.sequence.mission.elements;
     let mut facts = Vec::new();
     if let (true, [Element::Topic(_), ..]) = (is_item, members) {
         facts.extend(types(elements, members));
     }
-    let evidence = members
-        .iter()
-        .fold(Evidence::NONE, |all, m| all.and(elements.evidence(*m)));
+    let evidence = members.iter().map(|m| elements.evidence(*m));
+    let evidence = evidence.fold(Evidence::NONE, Evidence::and);
     let is_ros1 = is_ros1(page.sequence.mission).unwrap_or(false);
     facts.extend(evidence.lines().map(|line| known_by(&line, is_ros1)));
     if is_item {
@@ -323,7 +318,10 @@ fn facts_of(
             facts.push(format!("seen {} – {}", at(first), at(last)));
         }
         if members.len() > 1 {
-            let names = members.iter().filter_map(|m| name(elements, *m));
+            let names = members.iter().filter_map(|m| match elements.names(*m) {
+                (Some(_), Some(_)) => None,
+                (node, topic) => node.or(topic),
+            });
             let mut names: Vec<&str> = names.take(MOST_MEMBERS + 1).collect();
             let rest = members.len().saturating_sub(MOST_MEMBERS);
             names.truncate(MOST_MEMBERS);
@@ -333,8 +331,8 @@ fn facts_of(
             facts.push(format!("{many} together: {names}{more}"));
         }
     }
+    let facts = facts.into_iter();
     facts
-        .into_iter()
         .map(|f| words.place(visible(&f).into_owned()))
         .collect()
 }
@@ -352,7 +350,10 @@ fn known_by(line: &str, is_ros1: bool) -> String {
 
 /// The types of topics, and the quality of service with which they are offered.
 fn types(elements: &Elements, members: &[Element]) -> Vec<String> {
-    let mut topics = members.iter().filter_map(|m| topic(elements, *m));
+    let mut topics = members.iter().filter_map(|what| match what {
+        Element::Topic(id) => elements.topics.get(*id),
+        _ => None,
+    });
     let types = topics.clone().flat_map(|t| t.types.iter());
     let types: BTreeSet<&str> = types.map(|t| &**t).collect();
     let types: Vec<&str> = types.into_iter().collect();
@@ -360,20 +361,6 @@ fn types(elements: &Elements, members: &[Element]) -> Vec<String> {
     let mut facts = vec![format!("type {}", types.join(", "))];
     facts.extend(qos.map(|q| format!("quality of service {q}")));
     facts
-}
-
-fn topic(elements: &Elements, element: Element) -> Option<&crate::graph::Topic> {
-    match element {
-        Element::Topic(id) => elements.topics.get(id),
-        _ => None,
-    }
-}
-
-fn name(elements: &Elements, element: Element) -> Option<&str> {
-    match elements.names(element) {
-        (Some(_), Some(_)) => None,
-        (node, topic) => node.or(topic),
-    }
 }
 
 // A mission as data for a page: per element a flat list of its values and the windows from which they apply,
@@ -398,7 +385,6 @@ pub(crate) struct ElementRuns {
 }
 
 /// The whole sequence of a view as runs.
-#[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ViewRuns {
     /// Class words separated by blanks, such as `active`, `active stated added w3`; the first is `off`:
     /// absent.
@@ -415,8 +401,9 @@ impl ViewRuns {
     /// The runs of a view. `label` writes the rate of an element in a window, and the topics that an arrow carries;
     /// empty for none.
     pub(crate) fn of(view: &View, label: impl Fn(&Shown, Option<&Arrow>) -> String) -> Self {
-        let mut classes = ValueTable::starting_with(None);
-        let mut labels = ValueTable::starting_with(String::new());
+        let (mut classes, mut labels) = (TextTable::default(), TextTable::default());
+        classes.place("off".to_owned());
+        labels.place(String::new());
         let mut runs = |all: &[ShownRuns], arrows| {
             let mut recorder = RunRecorder {
                 classes: &mut classes,
@@ -430,8 +417,8 @@ impl ViewRuns {
         let items = runs(&view.items_shown, None);
         let arrows = runs(&view.arrows_shown, Some(&view.arrows));
         Self {
-            classes: classes.list(|class| class.map_or("off".to_owned(), LookClass::words)),
-            labels: labels.list(Clone::clone),
+            classes: classes.list(),
+            labels: labels.list(),
             items,
             arrows,
         }
@@ -454,70 +441,34 @@ impl ViewRuns {
     }
 }
 
-/// The properties that decide the look of an element in a window.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct LookClass {
-    state: State,
-    confidence: Confidence,
-    mark: Option<Mark>,
-    /// Whether the receiver gets nothing.
-    is_starved: bool,
-    /// The step of an arrow's thickness, 0..=[`STEPS`](crate::view::STEPS); 0 for items.
-    step: u8,
+/// The class words of an element in a window, those of an arrow with the step of its thickness.
+fn class(shown: &Shown, is_arrow: bool) -> String {
+    let mut words = vec![shown.state.word()];
+    words.extend((shown.confidence != Confidence::Measured).then(|| shown.confidence.word()));
+    if let Some(mark) = shown.mark {
+        words.push(mark.class());
+        words.extend((mark.class() == "changed").then(|| mark.badge()));
+    }
+    words.extend(shown.is_starved.then_some("starved"));
+    let step = format!("w{}", shown.width_step());
+    words.extend((is_arrow && step != "w0").then_some(&*step));
+    words.join(" ")
 }
 
-impl LookClass {
-    fn of(shown: &Shown, arrow: Option<&Arrow>) -> Self {
-        Self {
-            state: shown.state,
-            confidence: shown.confidence,
-            mark: shown.mark,
-            is_starved: shown.is_starved,
-            step: arrow.map_or(0, |_| shown.width_step()),
-        }
-    }
-
-    fn words(self) -> String {
-        let mut words = vec![self.state.word().to_owned()];
-        if self.confidence != Confidence::Measured {
-            words.push(self.confidence.word().to_owned());
-        }
-        if let Some(mark) = self.mark {
-            words.push(mark.class().to_owned());
-            words.extend((mark.class() == "changed").then(|| mark.badge().to_owned()));
-        }
-        if self.is_starved {
-            words.push("starved".to_owned());
-        }
-        if self.step > 0 {
-            words.push(format!("w{}", self.step));
-        }
-        words.join(" ")
-    }
-}
-
-/// Distinct values in order of appearance.
+/// Distinct texts in order of appearance.
 #[derive(Default)]
-pub(super) struct ValueTable<T> {
-    places: BTreeMap<T, u32>,
-}
+struct TextTable(BTreeMap<String, u32>);
 
-impl<T: Ord + Clone> ValueTable<T> {
-    fn starting_with(first: T) -> Self {
-        Self {
-            places: BTreeMap::from([(first, 0)]),
-        }
+impl TextTable {
+    fn place(&mut self, text: String) -> u32 {
+        let next = u32::try_from(self.0.len()).unwrap_or(u32::MAX);
+        *self.0.entry(text).or_insert(next)
     }
 
-    pub(super) fn place(&mut self, value: T) -> u32 {
-        let next = u32::try_from(self.places.len()).unwrap_or(u32::MAX);
-        *self.places.entry(value).or_insert(next)
-    }
-
-    pub(super) fn list(&self, write: impl Fn(&T) -> String) -> Vec<String> {
-        let mut out = vec![String::new(); self.places.len()];
-        for (value, place) in &self.places {
-            out[*place as usize] = write(value);
+    fn list(self) -> Vec<String> {
+        let mut out = vec![String::new(); self.0.len()];
+        for (text, place) in self.0 {
+            out[place as usize] = text;
         }
         out
     }
@@ -525,8 +476,8 @@ impl<T: Ord + Clone> ValueTable<T> {
 
 /// A writer of the values of the items, or of the arrows.
 struct RunRecorder<'a, F> {
-    classes: &'a mut ValueTable<Option<LookClass>>,
-    labels: &'a mut ValueTable<String>,
+    classes: &'a mut TextTable,
+    labels: &'a mut TextTable,
     label: F,
     arrows: Option<&'a [Arrow]>,
 }
@@ -544,7 +495,7 @@ impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
                 continue;
             };
             let arrow = self.arrows.and_then(|all| all.get(shown.id as usize));
-            let class = self.classes.place(Some(LookClass::of(shown, arrow)));
+            let class = self.classes.place(class(shown, arrow.is_some()));
             life.classes.push(window, class, 0);
             let each = shown.hz.map(|hz| hz / shown.each.max(1) as f64);
             let number = *numbers.entry(each.map(f64::to_bits)).or_insert_with(|| {
@@ -605,7 +556,7 @@ impl Serialize for ElementRuns {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::graph::ById;
+    use crate::graph::{ById, State};
     use crate::view::{ArrowKind, ItemId};
 
     /// One element over the windows: present with this mark and rate, or absent.

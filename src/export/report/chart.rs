@@ -36,11 +36,8 @@ pub(super) fn chart<'a>(mut view: &'a View, paired: Option<&'a View>) -> String 
     let mut out = markdown::block("mermaid", chart.trim_end());
     out += "\n\nSolid green: present only at the end. Dashed orange: present only at the start. Purple: changed in between.\n";
     if left_out > 0 {
-        let _ = writeln!(
-            out,
-            "\n{} left out of the graph.",
-            words::count(left_out, "edge")
-        );
+        let edges = words::count(left_out, "edge");
+        let _ = writeln!(out, "\n{edges} left out of the graph.");
     }
     let edges = words::count(seen.arrows.len(), "edge");
     if seen.arrows.len() > MOST_EDGES_OPEN {

@@ -15,6 +15,7 @@ use crate::layout::routes::{PORT_STEP, PORTS};
 use crate::layout::spacing::{PADDING, turned};
 use crate::layout::{
     Component, Layout, LayoutOptions, Link, Orientation, Outline, PartTask, Plan, Route, Vertex,
+    around,
 };
 
 /// The shapes, width over height, of the pages on which the contents of namespaces are laid out: columns, squares, rows.
@@ -82,12 +83,7 @@ impl<'a> Blocks<'a> {
             let (_, layout) = Draft::new(&sub.plan, &options)?.assembled(task.orientation);
             Some(Contents { sub, layout })
         };
-        let each = |space: &usize| {
-            SHAPES
-                .iter()
-                .map(|shape| laid_out(*space, *shape))
-                .collect()
-        };
+        let each = |space: &usize| SHAPES.iter().map(|s| laid_out(*space, *s)).collect();
         let contents: Option<Vec<Vec<Contents>>> = cut.spaces.par_iter().map(each).collect();
         Some(Self {
             contents: contents?,
@@ -184,7 +180,7 @@ struct Cut {
 
 impl Cut {
     fn new(part: &Component) -> Option<Self> {
-        let outermost = |home: &usize| part.around(*home).last().unwrap_or(0);
+        let outermost = |home: &usize| around(&part.parent, *home).last().unwrap_or(0);
         let space: Vec<usize> = part.home.iter().map(outermost).collect();
         let spaces: BTreeSet<usize> = space.iter().copied().filter(|space| *space != 0).collect();
         let is_between = |link: &usize| {

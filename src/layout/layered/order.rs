@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::place::Monotone;
-use crate::layout::{LayerItem, LayerRows, Layers};
+use crate::layout::{LayerItem, LayerRows, Layers, around};
 
 /// The largest number of sweeps of one order, and the number of sweeps without improvement after which it is
 /// abandoned. Half as many sweeps: drawings are 0.6 % smaller; twice as many: no drawing changes. Half the patience: 0.8 % fewer
@@ -143,10 +143,8 @@ impl<'a> Search<'a> {
         for row in &rows {
             for (i, &v) in row.iter().enumerate() {
                 key[v] = i as f64 - row.len() as f64 / 2.0 + throw(0.05);
-                let mut cluster = self.layers.home[v];
-                while cluster != 0 {
+                for cluster in around(&self.layers.parent, self.layers.home[v]) {
                     key[v] += shift[cluster];
-                    cluster = self.layers.parent[cluster];
                 }
             }
         }
@@ -180,12 +178,8 @@ fn depth_first(layers: &Layers, sources: bool) -> Vec<f64> {
             if met[v].is_nan() {
                 met[v] = clock;
                 clock += 1.0;
-                stack.extend(
-                    layers.down[v]
-                        .iter()
-                        .chain(&layers.up[v])
-                        .filter(|&&u| met[u].is_nan()),
-                );
+                let beside = layers.down[v].iter().chain(&layers.up[v]);
+                stack.extend(beside.filter(|&&u| met[u].is_nan()));
             }
         }
     }
@@ -199,7 +193,6 @@ fn depth_first(layers: &Layers, sources: bool) -> Vec<f64> {
 // once the order is stable, so values derived from a row are cached until that row or one beside it changes.
 
 /// A unit that moves as one inside its cluster: an item, or a whole cluster from its top to its bottom border.
-#[derive(Clone, Copy)]
 struct Unit {
     start: usize,
     extent: usize,
@@ -655,17 +648,13 @@ fn bracketed(layers: &Layers, around: usize, items: Vec<usize>) -> Vec<usize> {
     }
     for (cluster, members) in inside {
         let border = |v: &usize, kind| layers.home[*v] == cluster && layers.kind[*v] == kind;
-        row.extend(
-            members
-                .iter()
-                .copied()
-                .filter(|v| border(v, LayerItem::Top)),
-        );
-        let (borders, rest): (Vec<usize>, _) = members
-            .into_iter()
-            .partition(|v| border(v, LayerItem::Top) || border(v, LayerItem::Bottom));
+        let is_top = |v: &usize| border(v, LayerItem::Top);
+        let is_bottom = |v: &usize| border(v, LayerItem::Bottom);
+        let (top, inside): (Vec<usize>, Vec<_>) = members.into_iter().partition(is_top);
+        let (bottom, rest): (Vec<usize>, _) = inside.into_iter().partition(is_bottom);
+        row.extend(top);
         row.extend(bracketed(layers, cluster, rest));
-        row.extend(borders.into_iter().filter(|v| border(v, LayerItem::Bottom)));
+        row.extend(bottom);
     }
     row
 }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::PlacedPart;
 use crate::base::geometry::{Point, Rect};
 use crate::layout::layers::common;
-use crate::layout::{Cluster, Component, Layout, Link, Plan, Route};
+use crate::layout::{Cluster, Component, Layout, Link, Plan, Route, around};
 
 /// The parts of a plan without links between them, in the order of their first vertices.
 pub(crate) fn parts(plan: &Plan) -> Vec<Component> {
@@ -36,29 +36,23 @@ pub(crate) fn parts(plan: &Plan) -> Vec<Component> {
         let leader = groups.leader(plan.links[i].from);
         parts.entry(leader).or_default().links.push(i);
     }
-    parts
-        .into_values()
-        .map(|part| localised(plan, part))
-        .collect()
+    let parts = parts.into_values();
+    parts.map(|part| localised(plan, part)).collect()
 }
 
 /// The part with its ends, clusters and pieces as indices within it.
 fn localised(plan: &Plan, mut part: Component) -> Component {
     let at = |v: usize| part.vertices.binary_search(&v).unwrap_or(0);
-    part.ends = part
-        .links
-        .iter()
-        .map(|&i| (at(plan.links[i].from), at(plan.links[i].to)))
-        .collect();
+    let links = part.links.iter().map(|&i| &plan.links[i]);
+    part.ends = links.map(|link| (at(link.from), at(link.to))).collect();
     part.pieces = part.pieces.iter().map(|&v| at(v)).collect();
     part.clusters = clusters_of(plan, &part.vertices);
     let number = |c: usize| part.clusters.binary_search(&c).map_or(0, |i| i + 1);
     let home = |&v: &usize| plan.vertices[v].cluster.map_or(0, number);
     let parent = |&c: &usize| plan.clusters[c].parent.map_or(0, number);
     part.home = part.vertices.iter().map(home).collect();
-    part.parent = std::iter::once(0)
-        .chain(part.clusters.iter().map(parent))
-        .collect();
+    let parents = part.clusters.iter().map(parent);
+    part.parent = std::iter::once(0).chain(parents).collect();
     part
 }
 
@@ -129,10 +123,11 @@ impl Subplan {
                 });
             }
         }
-        let outer: BTreeSet<usize> = part.around(root).collect();
+        let outer: BTreeSet<usize> = around(&part.parent, root).collect();
         let mut used = BTreeSet::new();
         for &v in &vertices {
-            used.extend(part.around(part.home[v]).filter(|c| !outer.contains(c)));
+            let own = around(&part.parent, part.home[v]);
+            used.extend(own.filter(|c| !outer.contains(c)));
         }
         let clusters: Vec<usize> = used.into_iter().collect();
         let number = |c: usize| clusters.binary_search(&c).ok();
@@ -185,11 +180,6 @@ impl PlacedPart {
 }
 
 impl Component {
-    /// A cluster and those around it, the innermost first, without the outside.
-    pub(crate) fn around(&self, cluster: usize) -> impl Iterator<Item = usize> + '_ {
-        std::iter::successors(Some(cluster), |&c| Some(self.parent[c])).take_while(|&c| c != 0)
-    }
-
     /// The innermost cluster around everything; 0 if there is none.
     pub(crate) fn root(&self) -> usize {
         let homes = self.home.iter().copied();

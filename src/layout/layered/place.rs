@@ -53,7 +53,11 @@ pub(crate) fn place(layers: &Layers, rows: &LayerRows, apart: &[Vec<f64>]) -> Ve
     }
     table.straighten_borders();
     table.inside_borders();
-    table.by_item()
+    let mut across = vec![0.0; table.items.len()];
+    for (&v, place) in table.items.iter().zip(&table.across) {
+        across[v] = *place;
+    }
+    across
 }
 
 /// The items of all rows, row by row, while they are being placed.
@@ -308,14 +312,6 @@ impl<'a> Table<'a> {
             }
         }
     }
-
-    fn by_item(&self) -> Vec<f64> {
-        let mut across = vec![0.0; self.items.len()];
-        for (&v, place) in self.items.iter().zip(&self.across) {
-            across[v] = *place;
-        }
-        across
-    }
 }
 
 /// The weight with which two linked items are aligned: highest for the borders of a cluster, then for bends, so that long edges are
@@ -363,11 +359,8 @@ impl Monotone {
         for (goal, weight) in goals {
             let mut pool = Pool::new(goal * weight, weight, 1);
             while let Some(last) = self.pools.pop_if(|last| last.mean > pool.mean) {
-                pool = Pool::new(
-                    pool.sum + last.sum,
-                    pool.weight + last.weight,
-                    pool.count + last.count,
-                );
+                let (sum, weight) = (pool.sum + last.sum, pool.weight + last.weight);
+                pool = Pool::new(sum, weight, pool.count + last.count);
             }
             self.pools.push(pool);
         }

@@ -138,10 +138,8 @@ pub(crate) fn by_cluster(edges: &[(usize, usize)], home: &[usize], parent: &[usi
     let pairs: Vec<(usize, usize)> = order.into_iter().map(|(pair, _)| pair).collect();
     let turns = in_order(home.len() + parent.len(), &pairs);
     let turn: BTreeMap<_, _> = pairs.into_iter().zip(turns).collect();
-    sides
-        .iter()
-        .map(|pair| turn.get(pair).copied().unwrap_or(false))
-        .collect()
+    let turns = sides.iter().map(|pair| turn.get(pair).copied());
+    turns.map(Option::unwrap_or_default).collect()
 }
 
 /// The two units that an edge leaves and enters inside the innermost cluster around both of its ends: each a
@@ -160,10 +158,8 @@ fn parting((from, to): (usize, usize), home: &[usize], parent: &[usize]) -> (usi
 /// the vertex with the largest surplus of outgoing edges.
 pub(crate) fn greedy(n: usize, edges: &[(usize, usize)]) -> Vec<bool> {
     let place = greedy_order(n, edges);
-    edges
-        .iter()
-        .map(|&(from, to)| place[from] > place[to])
-        .collect()
+    let edges = edges.iter();
+    edges.map(|&(from, to)| place[from] > place[to]).collect()
 }
 
 fn greedy_order(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
@@ -176,21 +172,13 @@ fn greedy_order(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
         .collect();
     while let Some(rank) = left.pop_first() {
         let v = rank.vertex();
-        let end = if matches!(rank, Rank::Sink(_)) {
-            &mut last
-        } else {
-            &mut first
-        };
-        end.push(v);
-        for (ends, count_outgoing) in [(&before[v], true), (&after[v], false)] {
+        let is_sink = matches!(rank, Rank::Sink(_));
+        if is_sink { &mut last } else { &mut first }.push(v);
+        for (ends, is_before) in [(&before[v], 1), (&after[v], 0)] {
             for &u in ends {
                 let was_left = left.remove(&Rank::of(u, outgoing[u], incoming[u]));
-                let count = if count_outgoing {
-                    &mut outgoing[u]
-                } else {
-                    &mut incoming[u]
-                };
-                *count -= 1;
+                outgoing[u] -= is_before;
+                incoming[u] -= 1 - is_before;
                 if was_left {
                     left.insert(Rank::of(u, outgoing[u], incoming[u]));
                 }
@@ -221,10 +209,10 @@ impl Rank {
         match (outgoing, incoming) {
             (0, _) => Self::Sink(vertex),
             (_, 0) => Self::Source(vertex),
-            _ => Self::Between(
-                Reverse(outgoing.cast_signed() - incoming.cast_signed()),
-                vertex,
-            ),
+            _ => {
+                let surplus = outgoing.cast_signed() - incoming.cast_signed();
+                Self::Between(Reverse(surplus), vertex)
+            }
         }
     }
 
@@ -316,11 +304,8 @@ impl Adjacency {
         order.sort_by_key(|&v| (rank[v], v));
         let mut depth = vec![0; n];
         for &v in order.iter().rev() {
-            depth[v] = after[v]
-                .iter()
-                .map(|&u: &usize| depth[u] + 1)
-                .max()
-                .unwrap_or(0);
+            let behind = after[v].iter().map(|&u: &usize| depth[u] + 1);
+            depth[v] = behind.max().unwrap_or(0);
         }
         Self {
             before,
@@ -343,10 +328,8 @@ impl Adjacency {
     }
 
     fn leaves(&self, source: usize) -> usize {
-        self.after[source]
-            .iter()
-            .filter(|&&v| self.is_leaf(v))
-            .count()
+        let after = self.after[source].iter();
+        after.filter(|&&v| self.is_leaf(v)).count()
     }
 }
 

@@ -221,17 +221,14 @@ fn lying(layout: Layout, orientation: Orientation) -> Layout {
         return layout;
     }
     let rect = |r: &Rect| Rect::new(r.y, r.x, r.h, r.w);
+    let route = |route: &Route| route.mapped(|p| Point::new(p.y, p.x));
     Layout {
         size: turned(layout.size, orientation),
         boxes: layout.boxes.iter().map(rect).collect(),
         clusters: layout.clusters.iter().map(rect).collect(),
-        routes: layout.routes.iter().map(flipped).collect(),
+        routes: layout.routes.iter().map(route).collect(),
         ..layout
     }
-}
-
-fn flipped(route: &Route) -> Route {
-    route.mapped(|p| Point::new(p.y, p.x))
 }
 
 #[cfg(test)]

@@ -28,7 +28,11 @@ pub(crate) fn routes(plan: &Plan, boxes: &[Rect]) -> (Vec<Route>, usize) {
         let (from, to) = (plan.links[i].from, plan.links[i].to);
         let count = met.entry((from.min(to), from.max(to))).or_insert(0);
         *count += 1;
-        let ends = [from, to].map(|v| VertexPlace { plan, boxes, v });
+        let ends = [from, to].map(|at| End {
+            at,
+            rect: boxes[at],
+            outline: plan.vertices[at].outline,
+        });
         if from == to {
             routes[i] = ends[0].self_loop(*count);
             continue;
@@ -63,10 +67,7 @@ pub(crate) struct End {
 
 /// A route along these points with round corners.
 fn rounded(way: &[Point]) -> Route {
-    let mut route = Route {
-        start: way[0],
-        ..Route::default()
-    };
+    let mut route = Route::new(way[0], Vec::new());
     let mut at = way[0];
     for three in way.windows(3) {
         let (corner, next) = (three[1], three[2]);
@@ -125,60 +126,44 @@ impl Route {
     }
 }
 
-/// A vertex with its position.
-struct VertexPlace<'a> {
-    plan: &'a Plan,
-    boxes: &'a [Rect],
-    v: usize,
-}
-
-impl VertexPlace<'_> {
-    fn rect(&self) -> Rect {
-        self.boxes[self.v]
-    }
-
-    fn leaves(&self, inside: Point, outside: Point) -> Point {
-        let outline = self.plan.vertices[self.v].outline;
-        leaves(&self.rect(), outline, inside, outside)
-    }
-
-    /// A small arc on top, the later ones around the earlier.
+impl End {
+    /// A small arc on top of a box, the later ones around the earlier.
     fn self_loop(&self, count: usize) -> Route {
-        let (rect, n) = (self.rect(), count as f64);
+        let (rect, n) = (self.rect, count as f64);
         let half = (3.0 + 3.0 * n).min(rect.w / 4.0);
         let (x, top) = (rect.centre().x, rect.y - 6.0 - 8.0 * n);
         let foot =
             |x: f64| self.leaves(Point::new(x, rect.centre().y), Point::new(x, rect.y - 1.0));
         let (start, end) = (foot(x - half), foot(x + half));
-        Route {
-            start,
-            curves: vec![[Point::new(start.x, top), Point::new(end.x, top), end]],
-            label: None,
-        }
+        let arc = [Point::new(start.x, top), Point::new(end.x, top), end];
+        Route::new(start, vec![arc])
     }
-}
 
-/// The point where the line from a point inside to a point outside leaves an outline.
-fn leaves(rect: &Rect, outline: Outline, inside: Point, outside: Point) -> Point {
-    let (mut low, mut high) = (0.0, 1.0);
-    for _ in 0..40 {
-        let middle = f64::midpoint(low, high);
-        if outline.holds(rect, inside.towards(outside, middle)) {
-            low = middle;
-        } else {
-            high = middle;
+    /// The point where the line from a point inside to a point outside leaves the outline.
+    fn leaves(&self, inside: Point, outside: Point) -> Point {
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..40 {
+            let middle = f64::midpoint(low, high);
+            if self
+                .outline
+                .holds(&self.rect, inside.towards(outside, middle))
+            {
+                low = middle;
+            } else {
+                high = middle;
+            }
         }
+        inside.towards(outside, high)
     }
-    inside.towards(outside, high)
 }
 
 /// The ends of the `count`-th edge between two boxes, inside both, beside those of the edges before.
-fn shifted([from, to]: &[VertexPlace; 2], count: usize) -> (Point, Point) {
-    let (start, end) = (from.rect().centre(), to.rect().centre());
+fn shifted([from, to]: &[End; 2], count: usize) -> (Point, Point) {
+    let (start, end) = (from.rect.centre(), to.rect.centre());
     let is_even = count.is_multiple_of(2);
     let step = (count / 2) as f64 * if is_even { PARALLEL } else { -PARALLEL };
     // Edges in both directions use the same side.
-    let step = if from.v < to.v { step } else { -step };
+    let step = if from.at < to.at { step } else { -step };
     let length = start.distance(end).max(1e-9);
     let (x, y) = ((start.y - end.y) / length, (end.x - start.x) / length);
     let inside = |rect: Rect| {
@@ -186,22 +171,18 @@ fn shifted([from, to]: &[VertexPlace; 2], count: usize) -> (Point, Point) {
         let (x, y) = ((x * step).clamp(-wide, wide), (y * step).clamp(-high, high));
         Point::new(centre.x + x, centre.y + y)
     };
-    (inside(from.rect()), inside(to.rect()))
+    (inside(from.rect), inside(to.rect))
 }
 
 /// The route along a path, cut at the outlines, as straight pieces.
-fn drawn([a, b]: &[VertexPlace; 2], way: &[Point]) -> Route {
+fn drawn([a, b]: &[End; 2], way: &[Point]) -> Route {
     let last = way.len() - 1;
     let start = a.leaves(way[0], way[1]);
     let mut points = vec![start];
     points.extend(&way[1..last]);
     points.push(b.leaves(way[last], way[last - 1]));
     let piece = |pair: &[Point]| straight(pair[0], pair[1]);
-    Route {
-        start,
-        curves: points.windows(2).map(piece).collect(),
-        label: None,
-    }
+    Route::new(start, points.windows(2).map(piece).collect())
 }
 
 /// The obstacles in the way of edges, and the points where an edge can turn.
@@ -251,8 +232,8 @@ impl Map {
         way.extend(between);
         way.extend(self.way_to_lane(to, *last)?.iter().rev());
         let many = way.len();
-        way[0] = leaves(&from.rect, from.outline, way[0], way[1]);
-        way[many - 1] = leaves(&to.rect, to.outline, way[many - 1], way[many - 2]);
+        way[0] = from.leaves(way[0], way[1]);
+        way[many - 1] = to.leaves(way[many - 1], way[many - 2]);
         Some(rounded(&way))
     }
 
@@ -273,17 +254,17 @@ impl Map {
         let first = route.curves.first();
         let is_level = first.is_some_and(|first| (first[0].y - from.y).abs() < SAME);
         if is_level && self.clear(level, Point::new(from.x, level.y), own) {
-            let start = leaves(&end.rect, end.outline, level, Point::new(from.x, level.y));
+            let start = end.leaves(level, Point::new(from.x, level.y));
             return Some((route.raised(level.y).along(&[start]), true));
         }
         for lane in lanes.into_iter().filter(|_| is_level) {
             if self.clear(lane, Point::new(from.x, lane.y), own) && self.clear(foot, lane, own) {
-                let start = leaves(&end.rect, end.outline, foot, lane);
+                let start = end.leaves(foot, lane);
                 return Some((route.raised(lane.y).along(&[start, lane]), false));
             }
         }
         let mut way = self.way(middle, from, own)?;
-        way[0] = leaves(&end.rect, end.outline, way[0], way[1]);
+        way[0] = end.leaves(way[0], way[1]);
         way.pop();
         Some((route.along(&way), false))
     }

@@ -57,10 +57,10 @@ impl View {
             if (owners.len() == 1 || is_infrastructure)
                 && self.is_reported(topic, lines, is_infrastructure)
             {
-                let own = owners.into_iter();
-                rows.extend(
-                    own.map(|(owner, lines)| self.row((topic, owner), &lines, is_infrastructure)),
-                );
+                let row = |(owner, lines): (ItemId, Vec<ArrowId>)| {
+                    self.row((topic, owner), &lines, is_infrastructure)
+                };
+                rows.extend(owners.into_iter().map(row));
                 items_stay[topic] = false;
                 for at in lines {
                     arrows_stay[*at] = false;
@@ -113,10 +113,8 @@ impl View {
             let look = looks.at(*k);
             look.is_some_and(|look| !is_infrastructure || look.mark.is_some())
         };
-        let all = self.looks_of(lines).chain([looks]);
-        let windows = all.flat_map(ShownRuns::runs).map(|run| run.0 as usize);
-        let windows: BTreeSet<usize> = windows.filter(needs_line).collect();
-        let mut windows = windows.into_iter();
+        let windows = ShownRuns::turns(self.looks_of(lines).chain([looks])).into_iter();
+        let mut windows = windows.map(|window| window as usize).filter(needs_line);
         windows.all(|k| self.looks_of(lines).any(|line| line.at(k).is_some()))
     }
 

@@ -122,8 +122,7 @@ impl Fleets {
             let fleet = self.all.get(*self.place.get(space)?)?;
             let rest = key.name.get(space.len()..)?;
             let (kind, name) = (key.kind, format!("{}{rest}", fleet.name).into());
-            let key = ItemKey { kind, name };
-            Some(Fold { what, key })
+            Some((what, ItemKey { kind, name }))
         };
         keys.iter().filter_map(fold).collect()
     }
@@ -212,27 +211,16 @@ fn described(elements: &Elements) -> BTreeMap<&str, Inside> {
     all
 }
 
-/// A name relative to one of several equal namespaces.
-#[derive(Hash)]
-enum Seen<'a> {
-    /// In the namespace: the rest of the name.
-    Own(&'a str),
-    /// In another one with the same index: its name without the index, and the rest.
-    Alike(&'a str, &'a str),
-    Foreign(&'a str),
-}
-
-fn seen<'a>(name: &'a str, space: &str) -> Seen<'a> {
-    match name.strip_prefix(space) {
-        Some(rest) if is_within(name, space) => return Seen::Own(rest),
-        _ => {}
+/// A name relative to one of several equal namespaces: the rest of it inside, or inside of another with the same index, after that
+/// one's name without the index; the whole name elsewhere.
+fn seen<'a>(name: &'a str, space: &str) -> (Option<&'a str>, &'a str) {
+    if is_within(name, space) {
+        return (Some(""), &name[space.len()..]);
     }
-    match space_of(name) {
-        Some(other) if index(other) == index(space) => {
-            Seen::Alike(stem(other), &name[other.len()..])
-        }
-        _ => Seen::Foreign(name),
-    }
+    let other = space_of(name).filter(|other| index(other) == index(space));
+    other.map_or((None, name), |other| {
+        (Some(stem(other)), &name[other.len()..])
+    })
 }
 
 /// Drops fleets with a member that is linked to a namespace of the same index outside of all fleets, and

@@ -15,8 +15,9 @@ use crate::view::{Item, ItemKind, Namespace, View, ViewOptions};
 
 /// The namespaces to collapse and those to keep open.
 pub(crate) struct Collapse<'a> {
-    collapse: BTreeSet<&'a str>,
-    expand: BTreeSet<&'a str>,
+    pub(super) collapse: BTreeSet<&'a str>,
+    /// The namespaces, and single elements, that are kept open.
+    pub(super) expand: BTreeSet<&'a str>,
 }
 
 impl<'a> Collapse<'a> {
@@ -59,15 +60,6 @@ impl<'a> Collapse<'a> {
             .filter(|(space, [nodes, topics])| nodes + topics < 2 || *nodes == 1 && is_rest(space));
         let single: BTreeSet<&str> = single.map(|(space, _)| space).collect();
         self.collapse.retain(|space| !single.contains(space));
-    }
-
-    pub(crate) fn is_empty(&self) -> bool {
-        self.collapse.is_empty()
-    }
-
-    /// Whether this element itself is kept open, not only a namespace around it.
-    pub(crate) fn keeps(&self, name: &str) -> bool {
-        self.expand.contains(name)
     }
 }
 
@@ -279,10 +271,7 @@ fn outer_space(name: &str, levels: usize) -> String {
 }
 
 fn parent(space: &str) -> &str {
-    space
-        .rfind('/')
-        .and_then(|at| space.get(..at))
-        .unwrap_or_default()
+    space.rsplit_once('/').map_or("", |(parent, _)| parent)
 }
 
 /// Drops namespaces around a single item, which then belongs to the next outer one.

@@ -47,11 +47,9 @@ impl DotIds {
         };
         let items = view.items.iter().map(|i| item(i.kind, &i.name));
         let items: Vec<String> = items.map(|id| unlike(id, &mut taken)).collect();
-        let namespaces = view
-            .namespaces
-            .iter()
-            .map(|n| format!("cluster_{}", escape_name(&n.name)));
-        let namespaces = namespaces.map(|id| unlike(id, &mut taken)).collect();
+        let namespaces = view.namespaces.iter();
+        let ids = namespaces.map(|n| format!("cluster_{}", escape_name(&n.name)));
+        let namespaces = ids.map(|id| unlike(id, &mut taken)).collect();
         Self { items, namespaces }
     }
 }

@@ -68,22 +68,16 @@ impl DotView<'_> {
 
     fn cluster(&self, at: usize, name: &str) -> String {
         let place = self.layout.clusters.get(at).copied().unwrap_or_default();
-        let title = self
-            .plan
-            .clusters
-            .get(at)
-            .map_or_else(Size::default, |c| c.title);
+        let title = self.plan.clusters.get(at);
+        let title = title.map_or_else(Size::default, |c| c.title);
         let (top, bottom) = (self.up(place.y), self.up(place.bottom()));
         let bb = [place.x, bottom, place.right(), top].map(number).join(",");
-        let lp = Point::new(
+        let (x, y) = (
             place.x + MARGIN + title.w / 2.0,
             place.y + MARGIN / 2.0 + title.h / 2.0,
         );
-        format!(
-            "bb=\"{bb}\", label={}, lp=\"{}\"",
-            quoted(name),
-            self.point(lp)
-        )
+        let (label, lp) = (quoted(name), self.point(Point::new(x, y)));
+        format!("bb=\"{bb}\", label={label}, lp=\"{lp}\"")
     }
 
     fn item(&self, item: &Item, place: Rect, shown: &Shown) -> String {
@@ -113,12 +107,8 @@ impl DotView<'_> {
         let (arrow, route) = (self.view.arrows.get(at)?, self.layout.routes.get(at.at())?);
         let ids = &self.ids.items;
         let (from, to) = (ids.get(arrow.from.at())?, ids.get(arrow.to.at())?);
-        let mut out = format!(
-            " {from} -> {to} [pos=\"{}\", penwidth={}, style={}",
-            self.spline(arrow, route),
-            pen_width(shown),
-            line(shown),
-        );
+        let (pos, width, style) = (self.spline(arrow, route), pen_width(shown), line(shown));
+        let mut out = format!(" {from} -> {to} [pos=\"{pos}\", penwidth={width}, style={style}");
         if let Some(label) = label(arrow, shown) {
             let lp = route.label.unwrap_or_else(|| middle(route));
             let _ = write!(out, ", label={}, lp=\"{}\"", quoted(&label), self.point(lp));
@@ -164,10 +154,8 @@ impl DotView<'_> {
             ArrowKind::Publish => format!("Publisher\nnode_name: {from}\ntopic_name: {to}"),
             ArrowKind::Subscribe => format!("Subscription\nnode_name: {to}\ntopic_name: {from}"),
             ArrowKind::Direct(topic) => {
-                format!(
-                    "Publisher\nnode_name: {from}\ntopic_name: {}\nsubscriber: {to}",
-                    rich(topic)
-                )
+                let topic = rich(topic);
+                format!("Publisher\nnode_name: {from}\ntopic_name: {topic}\nsubscriber: {to}")
             }
             ArrowKind::Bundle => {
                 let topics = arrow.carries(shown).unwrap_or_default();
@@ -199,13 +187,10 @@ impl DotView<'_> {
 
     /// The route of an edge: its tip, then its curve up to the arrow's head.
     fn spline(&self, arrow: &Arrow, route: &Route) -> String {
-        let place = |id: ItemId| {
-            let place = self.layout.boxes.get(id.at());
-            place.map_or_else(Point::default, Rect::centre)
-        };
         let mut points = vec![route.start];
         points.extend(route.curves.iter().flatten());
         if points.len() < 4 {
+            let place = |id: ItemId| self.layout.boxes[id.at()].centre();
             let (from, to) = (place(arrow.from), place(arrow.to));
             points = vec![from, from, to, to];
         }
