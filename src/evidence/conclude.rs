@@ -161,7 +161,8 @@ fn concluded<'a>(
 ) -> (Conclusions<'a>, Notices, Vec<String>) {
     let start = recorded.span.map_or(Stamp(0), |s| s.start);
     let end = recorded.span.map_or(Stamp(0), |s| s.end.plus(-1));
-    let mut known = Conclusions::new(recorded, (start, end));
+    let (streams, facts) = (&recorded.streams, recorded.facts.clone());
+    let mut known = Conclusions::new(streams, &recorded.messages, facts, (start, end));
     known.take_at_their_word();
     for (row, source) in SOURCES.iter().enumerate() {
         for conclude in source.conclude {

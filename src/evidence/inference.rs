@@ -6,10 +6,9 @@ use std::sync::Arc;
 
 use crate::bag::{Connection, Encoding};
 use crate::base::ids::{ById, Few};
-use crate::base::name::{is_log, plain_type};
+use crate::base::name::{LOGS, is_log, plain_type};
 use crate::base::rhythm::CLOSE_NS;
 use crate::base::time::{Span, Stamp};
-use crate::evidence::collector::Recorded;
 use crate::evidence::message::dynamic::is_ros1_log;
 use crate::evidence::observation::{
     Confidence, EvidenceLine, LoggedText, Name, Observation, ObservationRecord, Observations,
@@ -205,8 +204,12 @@ pub(crate) struct Conclusions<'a> {
 }
 
 impl<'a> Conclusions<'a> {
-    pub(crate) fn new(heard: &'a Recorded, mission: (Stamp, Stamp)) -> Self {
-        let (streams, facts) = (&heard.streams[..], heard.facts.clone());
+    pub(crate) fn new(
+        streams: &'a [Stream],
+        messages: &'a Stamps,
+        facts: Observations,
+        mission: (Stamp, Stamp),
+    ) -> Self {
         let mut recorded: ById<Name, Vec<usize>> = ById::default();
         for (at, stream) in streams.iter().enumerate() {
             recorded.grown(stream.topic).push(at);
@@ -217,7 +220,7 @@ impl<'a> Conclusions<'a> {
             recorded,
             offers: offers(&facts.offers, streams),
             streams,
-            messages: Some(&heard.messages),
+            messages: Some(messages),
             facts,
             ..Self::default()
         }
@@ -330,6 +333,12 @@ impl<'a> Conclusions<'a> {
         connections().any(|c| is_ros1_log(&c.type_name))
             || connections().any(|c| c.encoding == Encoding::Ros1)
                 && self.topics_of(is_ros2).is_empty()
+    }
+
+    /// Whether a topic is the log of ROS 1, which a recorder receives its own records from only after it has subscribed to it.
+    pub(crate) fn is_log1(&self, topic: Name) -> bool {
+        let name = self.text(topic);
+        LOGS.iter().any(|log| name.ends_with(log))
     }
 
     /// Whether a bag has a connection of this topic, even without messages.

@@ -182,6 +182,7 @@ fn roscpp_names_what_it_publishes() {
         assert_eq!(
             observations("/rosout", "rosgraph_msgs/Log", Some("/a"), &record),
             [
+                "Continues /a",
                 "LogsFrom /a a.cpp",
                 "Node /a",
                 "Publish /a /rosout",

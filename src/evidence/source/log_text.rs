@@ -13,7 +13,6 @@ use crate::evidence::inference::{
 };
 use crate::evidence::message::dynamic::{LogRecord, is_ros1_log};
 use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
-use crate::evidence::source::rosout::is_log_of_all;
 use crate::evidence::source::{SHARED, SourceContext};
 use crate::evidence::source_id;
 
@@ -327,15 +326,10 @@ fn recordings(known: &mut Conclusions<'_>) -> Vec<(Stamp, bool)> {
         let early = topics.iter().filter(|(first, _)| *first <= end);
         let early: BTreeSet<Name> = early.map(|one| one.1).collect();
         let is_named = |topic: &Name| {
-            named
-                .range((*topic, start)..=(*topic, end))
-                .next()
-                .is_some()
+            let mut times = named.range((*topic, start)..=(*topic, end));
+            times.next().is_some()
         };
-        // The recorder receives its own records only after it has subscribed to the log.
-        let others = early
-            .into_iter()
-            .filter(|topic| !is_log_of_all(known, *topic));
+        let others = early.into_iter().filter(|topic| !known.is_log1(*topic));
         let (found, missed): (Vec<Name>, Vec<Name>) = others.partition(is_named);
         Some((start, found.len() >= missed.len()))
     };

@@ -195,15 +195,10 @@ const MOST_SILENT: usize = 10;
 /// Whether the recorder's log is whole, because it names all recorded topics, and the messages are not played back. The
 /// recorder receives no records of its own from before it subscribes to the log, and may lose one more.
 fn names_all(known: &Conclusions<'_>, named: &BTreeSet<Name>) -> bool {
-    let unnamed = |topic: &Name| !named.contains(topic) && !is_log_of_all(known, *topic);
+    let unnamed = |topic: &Name| !named.contains(topic) && !known.is_log1(*topic);
     let recorded: BTreeSet<Name> = known.streams.iter().map(|s| s.topic).collect();
     let is_played = known.streams.iter().any(|s| s.trust == Reliability::Player);
     !named.is_empty() && !is_played && recorded.into_iter().filter(unnamed).count() <= 1
-}
-
-/// Whether a topic is the log, which the recorder receives its own records from only after it has subscribed to it.
-pub(crate) fn is_log_of_all(known: &Conclusions<'_>, topic: Name) -> bool {
-    LOGS.iter().any(|log| known.text(topic).ends_with(log))
 }
 
 // Log records of ROS 2: a node is running. Dots represent slashes; the loggers of a node's parts count as the node.
