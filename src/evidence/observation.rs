@@ -64,7 +64,7 @@ observations! {
     Node(node),
     /// This node has just started.
     Begins(node),
-    /// The first log record of this node that was received is not its first.
+    /// This node logs a record that is not its first.
     Continues(node),
     /// This node has ended.
     NodeGone(node),
@@ -429,11 +429,6 @@ impl Observations {
         if let Some(times) = Arc::get_mut(&mut self.times) {
             times.add(fact.times, time.as_slice(), None);
         }
-    }
-
-    /// Whether `source` made this observation while reading, apart from snapshots.
-    pub(crate) fn has(&self, source: SourceId, observation: Observation) -> bool {
-        self.places.contains_key(&(observation, source, None))
     }
 
     /// Finishes adding observations.

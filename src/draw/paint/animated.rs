@@ -87,7 +87,7 @@ impl AnimatedScenes {
             xml.leaf("title", title).raw("\n");
         }
         xml.open("style").raw(
-            ".dots{animation:run linear infinite}@keyframes run{to{stroke-dashoffset:var(--to)}}\
+            ".dots{stroke-linecap:round;animation:run linear infinite}@keyframes run{to{stroke-dashoffset:var(--to)}}\
              @media(prefers-reduced-motion:reduce){.dots{display:none}\
              .on{visibility:visible!important}.off{visibility:hidden!important}}",
         );
@@ -188,7 +188,6 @@ fn dots(xml: &mut Xml, group: &Group) {
             .attribute("fill", "none")
             .attribute("stroke", stroke.color)
             .attribute("stroke-width", hundredth(stroke.width + 2.8))
-            .attribute("stroke-linecap", "round")
             .attribute(
                 "style",
                 format_args!(

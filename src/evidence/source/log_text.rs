@@ -2,7 +2,7 @@
 //! incompatible quality of service, of Gazebo's plugins, its bridge and rosserial about their endpoints), of two nodes of one name,
 //! and of roscpp about its connections.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::base::ids::grouped;
 use crate::base::name::{is_feedback, is_log, resolved};
@@ -282,13 +282,20 @@ pub(crate) fn conclude_births(source: SourceId, known: &mut Conclusions<'_>) {
 
 pub(crate) fn conclude_connected(source: SourceId, known: &mut Conclusions<'_>) {
     let recordings = recordings(known);
+    // The first log record of each node, and whether it is not its first.
+    let mut first: BTreeMap<Name, (Stamp, bool)> = BTreeMap::new();
     for fact in known.observed(source_id("rosout")) {
-        let Observation::Continues(node) = fact.observation else {
-            continue;
-        };
-        let Some(time) = known.times(&fact).first().copied() else {
-            continue;
-        };
+        if let Observation::Begins(node) | Observation::Continues(node) = fact.observation
+            && let Some(time) = known.times(&fact).first()
+        {
+            let own = (*time, matches!(fact.observation, Observation::Continues(_)));
+            first
+                .entry(node)
+                .and_modify(|one| *one = own.min(*one))
+                .or_insert(own);
+        }
+    }
+    for (node, (time, _)) in first.into_iter().filter(|one| one.1.1) {
         let mut before = recordings.iter().filter(|(start, _)| *start <= time);
         let is_connected = before.clone().any(|(_, is_whole)| *is_whole);
         if is_connected && before.all(|(start, _)| time.since(*start) > 2 * FOUND_NS) {

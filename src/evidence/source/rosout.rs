@@ -23,9 +23,6 @@ pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
     context.states(Observation::Node(node), logs);
     let log = context.stream.topic;
     if is_log(context.stream.connection.topic.as_str()) {
-        let is_own = context.stream.publisher == Some(node);
-        let publishes = Observation::Publish(node, log);
-        let is_first = is_own && !context.facts.has(context.source, publishes);
         // A relay of `topic_tools` logs this when its input begins, however long it has waited.
         let number = record
             .number
@@ -33,10 +30,10 @@ pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
         if number.is_some_and(|number| number <= FIRST_RECORD) {
             let begins = || format!("{name} logs its first record: {text}");
             context.states(Observation::Begins(node), begins);
-        } else if number.is_some() && is_first {
+        } else if number.is_some() && context.stream.publisher == Some(node) {
             context.states(Observation::Continues(node), String::new);
         }
-        context.states(publishes, logs);
+        context.states(Observation::Publish(node, log), logs);
         let is_host = |host: &Name| *host != node && !is_player(&context.facts.text(*host));
         if let Some(host) = context.stream.publisher.filter(is_host) {
             context.states(Observation::Carries(host, node), String::new);
