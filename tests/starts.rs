@@ -182,10 +182,11 @@ fn a_recorder_of_all_topics_dates_the_birth_of_each() {
 
 #[test]
 fn a_node_starts_when_the_recorder_connects_to_its_log() {
-    let text = |found: &[i64], number: u32, second: i64| {
+    let text = |found: &[i64], number: u32, second: i64, latching: bool| {
         let mut bag = minute(&[("/base", "/odom", 0, 60)]);
         let mut record = |node: &str, second, number: u32, text: &str, file| {
             let log = bag.publisher(node, "/rosout", "rosgraph_msgs/Log");
+            bag.publishers[log].latching = latching;
             LOG.clone_into(&mut bag.publishers[log].definition);
             let mut record = log1(node, text, file, &[]);
             record[..4].copy_from_slice(&number.to_le_bytes());
@@ -198,12 +199,35 @@ fn a_node_starts_when_the_recorder_connects_to_its_log() {
         record("/teleop", second, number, "ready", "teleop.py");
         sorted(bag)
     };
-    let started = text(&[0], 2, 30);
+    let started = text(&[0], 2, 30, true);
     assert!(started.contains("00:30.0  /teleop started"), "{started}");
     // Without the log of the recorder's start, this may be a part of a longer recording, and so may what comes at once.
-    assert_eq!(text(&[], 2, 30), "");
-    assert_eq!(text(&[20], 2, 30), "");
-    assert_eq!(text(&[0], 2, 3), "");
+    assert_eq!(text(&[], 2, 30, true), "");
+    assert_eq!(text(&[20], 2, 30, true), "");
+    assert_eq!(text(&[0], 2, 3, true), "");
+    // The log of roscpp is not latched: the first record may be from before the recording.
+    assert_eq!(text(&[0], 2, 30, false), "");
+}
+
+#[test]
+fn publishers_that_send_at_once_begin_with_a_topic_of_several() {
+    let mut bag = minute(&[]);
+    let log = bag.publisher("/record_1", "/rosout", "rosgraph_msgs/Log");
+    LOG.clone_into(&mut bag.publishers[log].definition);
+    for (second, topic) in [(0, "/view"), (20, "/bond")] {
+        let text = format!("Subscribing to {topic}");
+        let record = log1("/record_1", &text, "/src/recorder.cpp", &[]);
+        at(&mut bag, log, second, record);
+    }
+    for (node, second) in [("/crop", 21), ("/resize", 21), ("/later", 40)] {
+        let place = bag.publisher(node, "/bond", "std_msgs/String");
+        at(&mut bag, place, second, vec![7; 30]);
+        at(&mut bag, place, second + 13, vec![8; 30]);
+    }
+    let text = sorted(bag);
+    assert!(text.contains("00:20.0  /crop started"), "{text}");
+    assert!(text.contains("00:20.0  /resize started"), "{text}");
+    assert!(!text.contains("/later started"), "{text}");
 }
 
 #[test]

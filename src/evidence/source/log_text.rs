@@ -252,14 +252,24 @@ fn births(known: &mut Conclusions<'_>) -> Vec<(Name, Stamp)> {
     found.into_iter().filter_map(birth).collect()
 }
 
-/// A topic began when the recorder found it, and the only node that publishes it was there then.
+/// A topic began when the recorder found it, and so did the publications of the only node that publishes it, or of those that send at
+/// once. For example, `/manager`, `/crop` and `/resize` send to the topic of their bond within a second after it was found.
 pub(crate) fn conclude_births(source: SourceId, known: &mut Conclusions<'_>) {
     for (topic, birth) in births(known) {
-        let mut streams = known.streams.iter().filter(|stream| stream.topic == topic);
-        let node = streams.clone().find_map(|stream| stream.publisher);
-        let is_own = |s: &Stream| s.publisher == node && s.trust == Reliability::Whole;
-        let is_one = streams.all(is_own) && known.is_recorded(topic) && !is_log(&known.text(topic));
-        if is_one {
+        let streams = known.streams.iter().filter(|stream| stream.topic == topic);
+        let is_whole = |stream: &Stream| stream.trust == Reliability::Whole;
+        if !streams.clone().all(is_whole) || !known.is_recorded(topic) || is_log(&known.text(topic))
+        {
+            continue;
+        }
+        let nodes: BTreeSet<Option<Name>> =
+            streams.clone().map(|stream| stream.publisher).collect();
+        let is_there = |stream: &&Stream| {
+            let first = known.messages.and_then(|all| all.bounds(stream.times));
+            nodes.len() == 1 || first.is_some_and(|of| of.0.since(birth) <= FOUND_NS)
+        };
+        let there = streams.filter(is_there).map(|stream| stream.publisher);
+        for node in there.collect::<BTreeSet<_>>() {
             let what = match node {
                 Some(node) => ElementKey::Publish(node, topic),
                 None => ElementKey::Topic(topic),
@@ -276,7 +286,7 @@ pub(crate) fn conclude_births(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
-// The log of a node of ROS 1 is latched: a recorder that connects to it gets the last record at once. A node whose first record comes
+// The log of a node of rospy is latched: a recorder that connects to it gets the last record at once. A node whose first record comes
 // long after the recorder has connected to what was there, and is not the node's first, has just started. For example, `/teleop`
 // first logs at 101.2 s, with number 2: it sent number 1 before the recorder was connected, and would otherwise have been there at 0 s.
 

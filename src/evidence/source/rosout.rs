@@ -21,8 +21,9 @@ pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
     let node = context.name(name);
     let logs = || format!("{name} {verb}: {text}");
     context.states(Observation::Node(node), logs);
-    let log = context.stream.topic;
-    if is_log(context.stream.connection.topic.as_str()) {
+    let stream = context.stream;
+    let log = stream.topic;
+    if is_log(stream.connection.topic.as_str()) {
         // A relay of `topic_tools` logs this when its input begins, however long it has waited.
         let number = record
             .number
@@ -30,12 +31,12 @@ pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
         if number.is_some_and(|number| number <= FIRST_RECORD) {
             let begins = || format!("{name} logs its first record: {text}");
             context.states(Observation::Begins(node), begins);
-        } else if number.is_some() && context.stream.publisher == Some(node) {
+        } else if number.is_some() && stream.connection.latching && stream.publisher == Some(node) {
             context.states(Observation::Continues(node), String::new);
         }
         context.states(Observation::Publish(node, log), logs);
         let is_host = |host: &Name| *host != node && !is_player(&context.facts.text(*host));
-        if let Some(host) = context.stream.publisher.filter(is_host) {
+        if let Some(host) = stream.publisher.filter(is_host) {
             context.states(Observation::Carries(host, node), String::new);
         }
     }
