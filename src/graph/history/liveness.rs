@@ -110,18 +110,10 @@ pub(crate) fn collect(
                 }
             }
             Validity::Begins { signs, ends } => {
-                let ends = together(ends, &deaths);
-                liveness.bound_all(signs, &ends);
+                liveness.bound_all(signs, &together(ends, &deaths));
                 // Relays of ROS 1 advertise their topic when their input sends its first message.
-                let (is_late, _) = with_input(topic);
-                // Earlier messages of the node may have another's name.
-                if !is_late && (!is_rewritten || !is_from(&inference, "rosout")) {
-                    liveness.begins.extend(signs);
-                }
-                let is_found =
-                    is_from(&inference, "links") || is_from(&inference, "parameter_events");
-                if is_found && !is_late {
-                    liveness.found.extend(signs);
+                if !with_input(topic).0 {
+                    begin(liveness, &inference, signs, is_rewritten);
                 }
             }
             Validity::Moments(signs) => liveness.bound_all(signs, &deaths),
@@ -133,6 +125,16 @@ pub(crate) fn collect(
     }
     add_restarts(&mut liveness_of, restarts);
     Ok((liveness_of, likes))
+}
+
+/// Adds the times at which something of an element began; `is_rewritten`: earlier messages of a node may have another's name.
+fn begin(liveness: &mut Liveness, inference: &Inference, signs: &[Stamp], is_rewritten: bool) {
+    if !is_rewritten || !is_from(inference, "rosout") {
+        liveness.begins.extend(signs);
+    }
+    if is_from(inference, "links") || is_from(inference, "parameter_events") {
+        liveness.found.extend(signs);
+    }
 }
 
 /// Adds the ends and the first signs of nodes that restarted.
