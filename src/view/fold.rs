@@ -1,7 +1,7 @@
 //! Several elements drawn as one.
 //!
 //! In come the elements of a mission, the choice of those that are drawn, and the options; out comes the box of each node
-//! and topic. [`Boxes::keys`] is the list of rules in their order, and the place to begin: runs of one node, topics that belong
+//! and topic. [`keys`] is the list of rules in their order, and the place to begin: runs of one node, topics that belong
 //! together (actions, images, transforms), `equal` (robots of a fleet), nodes that are there in the same phases, `namespaces`
 //! (collapsed ones). One rule needs the looks of the drawn boxes: `box_rows` (topics as rows of boxes).
 
