@@ -132,7 +132,7 @@ fn following_a_database_never_locks_it() {
         db.execute_batch(pragmas).unwrap();
         // Like rosbag2, without any timeout.
         db.busy_timeout(Duration::ZERO).unwrap();
-        let mut follower = bagreel(folder.path(), &["follow", "r.db3", "--idle", "1s"])
+        let follower = bagreel(folder.path(), &["follow", "r.db3", "--idle", "1s"])
             .spawn()
             .unwrap();
         let begun = Instant::now();
@@ -145,7 +145,9 @@ fn following_a_database_never_locks_it() {
         }
         assert!(written > 100, "{written}");
         db.close().unwrap();
-        assert!(follower.wait().unwrap().success());
+        let done = follower.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert!(done.status.success(), "{said}");
         // If the follower reads while the recorder closes, SQLite leaves its journal until the database is
         // opened again.
         let db = Connection::open(&path).unwrap();

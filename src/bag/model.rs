@@ -217,9 +217,9 @@ pub trait Reader: Send {
 /// The outcome of one poll of a growing recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Growth {
-    /// Nothing new could be read.
+    /// Nothing was written.
     Same,
-    /// Something new was reported.
+    /// Something was written, and what has become readable of it was reported.
     More,
     /// The recording is over, and all of it was reported.
     Ended,

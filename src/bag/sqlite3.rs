@@ -425,28 +425,26 @@ impl Growing for GrowingDb {
             .into_iter()
             .filter_map(|p| state(p))
             .collect();
-        if now == self.seen || self.looks < EVERY {
+        if now == self.seen {
             return Ok(Growth::Same);
+        }
+        if self.looks < EVERY {
+            return Ok(Growth::More);
         }
         (self.seen, self.looks) = (now, 0);
         let has_log = wal.metadata().is_ok_and(|log| log.len() > 0);
         let ready = Ready::growing(&self.path, has_log);
         // The table may not exist yet.
         let Ok(bag) = bag(ready, &source, &OpenOptions::default()) else {
-            return Ok(Growth::Same);
+            return Ok(Growth::More);
         };
         for topic in bag.topics.iter().skip(self.wants.len()) {
             self.wants.push(sink.connection(topic));
         }
-        let before = self.next;
         if let Ok(db) = Db::open(&bag.ready) {
             self.next = RowReader::new(&bag, &self.wants, None).read_from(&db, self.next, sink);
         }
-        Ok(if self.next > before {
-            Growth::More
-        } else {
-            Growth::Same
-        })
+        Ok(Growth::More)
     }
 
     fn path(&self) -> &Path {
