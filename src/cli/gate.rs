@@ -260,9 +260,11 @@ pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Termin
     }
     if let Some(path) = &args.update {
         let (path, changed) = (path.display(), words::count(done.changed, "fact"));
-        let left = words::count(done.left, "finding");
-        let left = format!("; {left} of rules left, which only you can resolve");
-        let left = Some(left).filter(|_| done.left > 0).unwrap_or_default();
+        let findings = words::count(done.left, "finding");
+        let left = match done.left {
+            0 => String::new(),
+            _ => format!("; {findings} of rules left, which only you can resolve"),
+        };
         terminal.status(&format!("{path}: {changed} updated{left}"));
     } else {
         let counts = [(done.nodes, "node"), (done.topics, "topic")];

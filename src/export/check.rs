@@ -22,16 +22,19 @@ pub(crate) fn check(targets: &[Target], kept: &[PathBuf]) -> Result<()> {
     for (at, target) in targets.iter().enumerate() {
         let name = target.path().display();
         if let Some(other) = targets[..at].iter().find(|t| t.may_meet(target)) {
-            let what = match other.path().display() {
-                _ if *other == *target => format!("`{name}` is requested twice"),
-                other => format!("`{name}` and `{other}` may be the same file"),
+            let path = other.path().display();
+            let what = if *other == *target {
+                format!("`{name}` is requested twice")
+            } else {
+                format!("`{name}` and `{path}` may be the same file")
             };
             return Err(Error::usage(what, "give every output its own name"));
         }
         if let Some(path) = kept.iter().find(|path| would_harm(target, path)) {
-            let whose = match path.display() {
-                folder if path.is_dir() => format!("a file of `{folder}`"),
-                _ => "an input".to_owned(),
+            let whose = if path.is_dir() {
+                format!("a file of `{}`", path.display())
+            } else {
+                "an input".to_owned()
             };
             let what = format!("`{name}` would overwrite {whose}");
             return Err(Error::usage(what, "give the output another name"));

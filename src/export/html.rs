@@ -599,7 +599,11 @@ impl PageChanges {
             return String::new();
         }
         xml.open("details").attribute("open", "");
-        let summary = ["All changes", "Differences"][usize::from(compares)];
+        let summary = if compares {
+            "Differences"
+        } else {
+            "All changes"
+        };
         xml.leaf("summary", summary);
         if lines.len() > MOST_ROWS {
             let text = format!("The first {MOST_ROWS} of {}:", lines.len());

@@ -127,7 +127,10 @@ impl<'a> Draft<'a> {
 }
 
 /// One way of cutting and ordering a part.
-type Ordering = (Layers, LayerOrder);
+struct Ordering {
+    layers: Layers,
+    order: LayerOrder,
+}
 
 /// The drafts of a part, none if it is too large: every way of ranking, with long edges routed outside and
 /// inside of clusters.
@@ -167,8 +170,8 @@ fn orderings(plan: &Plan, part: &Component, options: &LayoutOptions) -> Vec<Orde
     let both = searches.into_par_iter().zip(is_promising);
     let found: Vec<_> = both.map(|(search, is)| is.then(|| last(search))).collect();
     let both = layers.into_iter().zip(found);
-    both.filter_map(|(layers, order)| Some((layers, order?)))
-        .collect()
+    let found = both.filter_map(|(layers, order)| order.map(|order| Ordering { layers, order }));
+    found.collect()
 }
 
 /// The share of the best possible quality below which the search for an order is abandoned. Compared with
@@ -197,15 +200,15 @@ fn promising(
         all.map(|search| bound(task, search.layers, &search.found()))
             .collect()
     });
-    let bounds: Vec<Vec<(f64, f64)>> = bounds.collect();
+    let bounds: Vec<Vec<Bound>> = bounds.collect();
     let mut all = bounds.iter().flatten();
-    let is_useful = all.any(|(fit, _)| *fit >= options.least);
+    let is_useful = all.any(|bound| bound.fit >= options.least);
     let mut promising = vec![false; searches.len()];
     for bounds in bounds {
-        let best = bounds.iter().map(|(_, quality)| *quality);
+        let best = bounds.iter().map(|bound| bound.quality);
         let least = PROMISING * best.fold(0.0, f64::max);
-        for (is, (_, quality)) in promising.iter_mut().zip(bounds) {
-            *is |= quality >= least;
+        for (is, bound) in promising.iter_mut().zip(bounds) {
+            *is |= bound.quality >= least;
         }
     }
     (promising, is_useful)
@@ -217,13 +220,22 @@ fn orientations(options: &LayoutOptions) -> Vec<Orientation> {
     options.orientation.map_or(both, |asked| vec![asked])
 }
 
-/// Upper bounds for the drawing of a part with this order: the scale at which it fits the page, and its quality.
-fn bound(task: PartTask<'_>, layers: &Layers, order: &LayerOrder) -> (f64, f64) {
+/// Upper bounds for the drawing of a part.
+struct Bound {
+    /// The scale at which it fits the page.
+    fit: f64,
+    quality: f64,
+}
+
+/// The upper bounds for the drawing of a part with this order.
+fn bound(task: PartTask<'_>, layers: &Layers, order: &LayerOrder) -> Bound {
     let room = Spacing::new(task, layers);
     let (size, length) = room.least(&order.rows, &room.apart(&order.rows));
     let size = turned(size, task.orientation);
-    let quality = task.quality(size, (order.crossings, length)) * ROUNDING;
-    (pack::fit(size, task.options.page), quality)
+    Bound {
+        fit: pack::fit(size, task.options.page),
+        quality: task.quality(size, (order.crossings, length)) * ROUNDING,
+    }
 }
 
 /// Ranks for a part: cycles broken in different ways, shallow graphs folded.
@@ -331,7 +343,7 @@ fn best_block(task: PartTask<'_>, orderings: &[Ordering]) -> PlacedPart {
         if next.0 > best.0 { next } else { best }
     };
     // The most promising first: most others can then be rejected before they are placed.
-    let hoped = |(layers, order): &Ordering| bound(task, layers, order).1;
+    let hoped = |way: &Ordering| bound(task, &way.layers, &way.order).quality;
     let mut ways: Vec<(f64, usize)> = orderings.iter().map(hoped).zip(0..).collect();
     ways.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut best: Option<(f64, usize, PlacedPart)> = None;
@@ -357,7 +369,7 @@ fn best_block(task: PartTask<'_>, orderings: &[Ordering]) -> PlacedPart {
     let inside = inside(task, is_long);
     // Orders that only differ in the lanes of edges are cut into the same rows.
     let mut seen = BTreeSet::new();
-    let ways = orderings.iter().filter(|_| is_long).map(|way| &way.0);
+    let ways = orderings.iter().filter(|_| is_long).map(|way| &way.layers);
     let ways = ways.filter(|layers| seen.insert(&layers.rank[..layers.vertices]));
     let wraps = ways.flat_map(|layers| wrap::wraps(task, layers));
     let others = inside.into_iter().chain(wraps).map(judged);
@@ -369,7 +381,7 @@ fn best_block(task: PartTask<'_>, orderings: &[Ordering]) -> PlacedPart {
     blocks::best(task).into_iter().fold(best, better).1
 }
 
-fn block(task: PartTask<'_>, (layers, order): &Ordering) -> PlacedPart {
+fn block(task: PartTask<'_>, Ordering { layers, order }: &Ordering) -> PlacedPart {
     let room = Spacing::new(task, layers);
     let across = place::place(layers, &order.rows, &room.apart(&order.rows));
     let columns = room.columns(&order.rows, &across);

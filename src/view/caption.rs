@@ -275,7 +275,7 @@ impl<'a> CaptionWriter<'a> {
         let name = self.name(headline.what);
         match self.event(headline.event).map(|e| &e.detail) {
             Some(Detail::Rates { from_hz, to_hz }) => {
-                let change = words::rate_change(*from_hz, *to_hz);
+                let change = words::rates(&[*from_hz, *to_hz]);
                 Said::new(11, ' ', format!("{name} {change}"), "")
             }
             Some(Detail::Senders { from, to }) if !from.is_empty() && !to.is_empty() => {
@@ -305,10 +305,12 @@ impl<'a> CaptionWriter<'a> {
             _ => (2, '−', "ends", "no longer "),
         };
         let name = self.name(headline.what);
-        let lead = self.subject_of_edge(headline.what, not);
-        Said {
-            lead: lead.clone().unwrap_or_default(),
-            ..Said::new(rank, sign, name, lead.map_or(verb, |_| ""))
+        match self.subject_of_edge(headline.what, not) {
+            None => Said::new(rank, sign, name, verb),
+            Some(lead) => Said {
+                lead,
+                ..Said::new(rank, sign, name, "")
+            },
         }
     }
 

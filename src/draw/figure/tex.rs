@@ -26,10 +26,8 @@ pub(crate) fn caption(
     }
     if let Some(bag) = source.mission.bags.first() {
         let length = words::duration(source.span().nanos());
-        let (name, version) = (
-            escaped(&words::visible(&bag.name)),
-            env!("CARGO_PKG_VERSION"),
-        );
+        let name = escaped(&words::visible(&bag.name));
+        let version = env!("CARGO_PKG_VERSION");
         parts.push(format!(
             "Bag \\texttt{{{name}}}, {length}; bagreel {version}."
         ));

@@ -1,8 +1,8 @@
 //! Scenes one after the other as one animated SVG: each group once for each of its looks, visible while it
 //! has that look.
 //!
-//! It runs inside `<img>`, and looks like every other animation, but for a dot per message that runs along its line. Users who prefer reduced motion, and viewers
-//! without animations, get one of the scenes.
+//! It runs inside `<img>`, and looks like every other animation, but for a dot per message that runs along its line.
+//! Users who prefer reduced motion, and viewers without animations, get one of the scenes.
 
 use std::collections::BTreeMap;
 
@@ -175,25 +175,18 @@ fn dots(xml: &mut Xml, group: &Group) {
         _ => None,
     });
     let Some((steps, stroke)) = line else { return };
-    for (flow, back) in group.flow.iter().zip([-1.0, 1.0]) {
-        if *flow == 0 {
-            continue;
-        }
+    let flows = group.flow.iter().zip([-1.0, 1.0]);
+    for (flow, back) in flows.filter(|(flow, _)| **flow > 0) {
         let apart = SPEED * 100.0 / f64::from(*flow);
-        let (gap, seconds) = (tenth(apart), hundredth(apart / SPEED));
-        let to = tenth(back * apart);
+        let (to, gap, seconds) = (tenth(back * apart), tenth(apart), hundredth(apart / SPEED));
+        let pace = format!("--to:{to}px;stroke-dasharray:.01 {gap};animation-duration:{seconds}s");
         xml.open("path")
             .attribute("class", "dots")
             .attribute("d", svg::PathSteps(steps))
             .attribute("fill", "none")
             .attribute("stroke", stroke.color)
             .attribute("stroke-width", hundredth(stroke.width + 2.8))
-            .attribute(
-                "style",
-                format_args!(
-                    "--to:{to}px;stroke-dasharray:.01 {gap};animation-duration:{seconds}s"
-                ),
-            )
+            .attribute("style", pace)
             .close_empty();
     }
 }

@@ -184,13 +184,15 @@ pub(crate) fn share(
 ) {
     for (gate, names) in gates {
         // Lines that are drawn separately in some window keep their own.
-        let is_changed = |at: ArrowId| !view.arrows_shown[at].distinct().iter().all(is_quiet);
+        let shown = |at: ArrowId| view.arrows_shown.get(at);
+        let is_lively = |shown: &ShownRuns| !shown.distinct().iter().all(is_quiet);
+        let is_changed = |at: ArrowId| shown(at).is_some_and(is_lively);
         let is_lead_changed = is_changed(gate.lead);
         for at in gate.lines() {
             rooms[at] = rooms[at].filter(|_| is_lead_changed || is_changed(at));
         }
         let look = |at: ArrowId, window: u32| view.arrows_shown[at].at(window as usize);
-        for window in ShownRuns::turns(gate.lines().map(|at| &view.arrows_shown[at])) {
+        for window in ShownRuns::turns(gate.lines().filter_map(shown)) {
             let shown = gate.shown(view, |at| look(at, window));
             let rows = shown.map(|(shown, _)| texts::rows(&shown, names));
             let room = rows.and_then(|rows| texts::room(&rows, fonts, style));

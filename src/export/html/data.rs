@@ -450,8 +450,9 @@ fn class(shown: &Shown, is_arrow: bool) -> String {
         words.extend((mark.class() == "changed").then(|| mark.badge()));
     }
     words.extend(shown.is_starved.then_some("starved"));
-    let step = format!("w{}", shown.width_step());
-    words.extend((is_arrow && step != "w0").then_some(&*step));
+    let step = Some(shown.width_step()).filter(|step| is_arrow && *step > 0);
+    let step = step.map(|step| format!("w{step}"));
+    words.extend(step.as_deref());
     words.join(" ")
 }
 

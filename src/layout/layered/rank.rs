@@ -172,13 +172,19 @@ fn greedy_order(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
         .collect();
     while let Some(rank) = left.pop_first() {
         let v = rank.vertex();
-        let is_sink = matches!(rank, Rank::Sink(_));
-        if is_sink { &mut last } else { &mut first }.push(v);
-        for (ends, is_before) in [(&before[v], 1), (&after[v], 0)] {
+        match rank {
+            Rank::Sink(_) => last.push(v),
+            _ => first.push(v),
+        }
+        for (ends, is_before) in [(&before[v], true), (&after[v], false)] {
             for &u in ends {
                 let was_left = left.remove(&Rank::of(u, outgoing[u], incoming[u]));
-                outgoing[u] -= is_before;
-                incoming[u] -= 1 - is_before;
+                let counts = if is_before {
+                    &mut outgoing
+                } else {
+                    &mut incoming
+                };
+                counts[u] -= 1;
                 if was_left {
                     left.insert(Rank::of(u, outgoing[u], incoming[u]));
                 }

@@ -190,8 +190,8 @@ impl DotView<'_> {
         let mut points = vec![route.start];
         points.extend(route.curves.iter().flatten());
         if points.len() < 4 {
-            let place = |id: ItemId| self.layout.boxes[id.at()].centre();
-            let (from, to) = (place(arrow.from), place(arrow.to));
+            let centre = |id: ItemId| Some(self.layout.boxes.get(id.at())?.centre());
+            let [from, to] = [arrow.from, arrow.to].map(|id| centre(id).unwrap_or_default());
             points = vec![from, from, to, to];
         }
         let last = points.len() - 1;
