@@ -13,6 +13,15 @@ pub(crate) fn grouped<K: Ord, V>(pairs: impl IntoIterator<Item = (K, V)>) -> BTr
     groups
 }
 
+/// How often each of these is among them.
+pub(crate) fn tally<K: Ord>(keys: impl IntoIterator<Item = K>) -> BTreeMap<K, usize> {
+    let mut counts = BTreeMap::new();
+    for key in keys {
+        *counts.entry(key).or_default() += 1;
+    }
+    counts
+}
+
 /// The number of a thing in the list of all things of its kind, counted from 0.
 pub trait Id: Copy {
     /// The id of the thing at an index.

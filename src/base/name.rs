@@ -84,6 +84,12 @@ pub fn namespace(name: &str) -> &str {
     }
 }
 
+/// A name, and the namespaces that it is in, the innermost first, without the root.
+pub(crate) fn with_spaces(name: &str) -> impl Iterator<Item = &str> {
+    let above = std::iter::successors(Some(name), |name| Some(name.rsplit_once('/')?.0));
+    above.take_while(|name| !name.is_empty())
+}
+
 /// The full name of a topic as a node names it: `/tf` for all, `scan` in the node's namespace, `../map` in the one around
 /// that, `~/map` or `~map` below the node's name.
 pub(crate) fn resolved(topic: &str, node: &str) -> String {

@@ -62,15 +62,10 @@ pub fn rate(hz: f64) -> String {
     format!("{value} {unit}")
 }
 
-/// A rate that changed: `15 → 7.4 Hz`, `900 Hz → 1.2 kHz`.
-pub fn rate_change(from_hz: f64, to_hz: f64) -> String {
-    rates(&[from_hz, to_hz])
-}
-
 /// The most rates in a row of them.
 const MOST_RATES: usize = 4;
 
-/// Rates one after the other: `10 → 5 → 10 Hz`; of more than four, the first two, the last, and `…` for the others.
+/// Rates one after the other: `10 → 5 → 10 Hz`, `900 Hz → 1.2 kHz`; of more than four, the first two, the last, and `…` for the others.
 pub fn rates(all_hz: &[f64]) -> String {
     let split: Vec<(String, &str)> = all_hz.iter().map(|hz| split_rate(*hz)).collect();
     let unit = split.last().map_or("", |last| last.1);
@@ -407,8 +402,8 @@ mod tests {
             (rate(999.6), "1 kHz"),
             (rate(1200.0), "1.2 kHz"),
             (rate(48_000.0), "48 kHz"),
-            (rate_change(15.0, 7.4), "15 → 7.4 Hz"),
-            (rate_change(900.0, 1200.0), "900 Hz → 1.2 kHz"),
+            (rates(&[15.0, 7.4]), "15 → 7.4 Hz"),
+            (rates(&[900.0, 1200.0]), "900 Hz → 1.2 kHz"),
             (rate_range(Some(13.5), Some(16.0)), "13.5–16 Hz"),
             (rate_range(Some(13.5), None), "at least 13.5 Hz"),
             (count_range(None, Some(0.0)), "none"),

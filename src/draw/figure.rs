@@ -6,8 +6,6 @@
 pub(crate) mod steps;
 mod tex;
 
-use std::collections::BTreeMap;
-
 use super::scene::{Scene, Stroke};
 use super::text::Fonts;
 use super::timeline::canvas::{HAIRLINE, PX_PER_MM, PaperCanvas, Sizes, Type, ink};
@@ -19,6 +17,7 @@ use super::timeline::{FigureSource, Timeline};
 use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Point, Rect, Size};
+use crate::base::ids::tally;
 use crate::base::name::ShortNames;
 use crate::base::time::Span;
 use crate::base::words::{self, worded};
@@ -222,12 +221,12 @@ impl<'a> FigureSheet<'a> {
 
 /// The filter that leaves as many tracks as fit: the largest namespace that is not too large.
 fn filter_that_fits(tracks: &[Row], most: usize, flag: &str, word: &str) -> String {
-    let mut spaces: BTreeMap<&str, usize> = BTreeMap::new();
-    // The outermost namespace of a name, if it is in one.
-    let top = |row: &'_ Row| row.name.get(1..)?.find('/').map(|end| end + 1);
-    for (row, end) in tracks.iter().filter_map(|row| Some((row, top(row)?))) {
-        *spaces.entry(&row.name[..end]).or_default() += 1;
-    }
+    // The outermost namespace of each name that is in one.
+    let tops = tracks.iter().filter_map(|row| {
+        let end = row.name.get(1..)?.find('/')? + 1;
+        Some(&row.name[..end])
+    });
+    let spaces = tally(tops);
     let fitting = spaces.iter().filter(|(_, many)| **many <= most);
     let best = fitting.max_by_key(|(name, many)| (**many, std::cmp::Reverse(**name)));
     let most = words::count(most, word);

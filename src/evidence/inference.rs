@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::bag::{Connection, Encoding};
 use crate::base::ids::{ById, Few};
-use crate::base::name::{LOGS, is_log, plain_type};
+use crate::base::name::{LOGS, is_log, plain_type, with_spaces};
 use crate::base::rhythm::CLOSE_NS;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::message::dynamic::is_ros1_log;
@@ -122,6 +122,16 @@ pub(crate) enum Validity {
     Unending,
     /// For the whole mission, regardless of signs.
     Always,
+}
+
+impl Validity {
+    /// From this time to the next end.
+    pub(crate) fn begin(time: Stamp) -> Self {
+        Self::Begins {
+            signs: vec![time],
+            ends: Vec::new(),
+        }
+    }
 }
 
 /// A piece of evidence for an element.
@@ -361,15 +371,8 @@ impl<'a> Conclusions<'a> {
 
     /// The known node that a logger belongs to: the one of its name, or the nearest above it in the namespaces.
     pub(crate) fn owner(&self, logger: &str) -> Option<Name> {
-        let mut above = logger;
-        while !above.is_empty() {
-            let node = self.facts.known(above);
-            if let Some(node) = node.filter(|n| self.nodes.contains(n)) {
-                return Some(node);
-            }
-            above = &above[..above.rfind('/').unwrap_or(0)];
-        }
-        None
+        let mut known = with_spaces(logger).filter_map(|name| self.facts.known(name));
+        known.find(|name| self.nodes.contains(name))
     }
 
     /// The texts of loggers that belong to a node, sorted by time, each with the name of its node; none if not all were kept,

@@ -52,10 +52,8 @@ pub(super) fn collect(
     };
     // By a clock that is years apart, all messages of a bag were set aside.
     let spans = copies::spans(&all.recorded);
-    if shifts
-        .with_ids()
-        .any(|(bag, by)| *by != 0 && spans.some(bag).is_none())
-    {
+    let is_aside = |(bag, by): (usize, &i64)| *by != 0 && spans.some(bag).is_none();
+    if shifts.with_ids().any(is_aside) {
         all = again(&shifts, &Copies::default())?;
         shifts = ById::default();
     }

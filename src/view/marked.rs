@@ -9,7 +9,7 @@ use super::{
     Arrow, ArrowId, ArrowKind, Counts, Headline, Item, ItemId, ItemKind, Mark, Shown, ShownRuns,
     View,
 };
-use crate::base::ids::grouped;
+use crate::base::ids::{grouped, tally};
 use crate::base::name::{last_part, namespace};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{ById, Element};
@@ -560,10 +560,7 @@ impl View {
 
 /// The namespace of most of these names; none if it is the root, or that of one of them.
 fn home(names: &[&str]) -> Option<String> {
-    let mut spaces: BTreeMap<&str, usize> = BTreeMap::new();
-    for name in names {
-        *spaces.entry(namespace(name)).or_default() += 1;
-    }
+    let mut spaces = tally(names.iter().map(|name| namespace(name)));
     spaces.retain(|space, many| *space != "/" && *many > 1);
     let most = spaces
         .into_iter()

@@ -11,10 +11,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::ids::grouped;
+use crate::base::ids::{grouped, tally};
 use crate::base::name::{is_player, is_recorder, last_part, namespace};
 use crate::base::notice::{Notice, NoticeKind};
-use crate::base::words::{count, some_of, worded};
+use crate::base::words::{count, joined, some_of, worded};
 use crate::evidence::code::Code;
 use crate::evidence::code::declaration::{Declaration, Role, type_key};
 use crate::evidence::code::workspace::{FileDeclaration, Instance};
@@ -150,12 +150,8 @@ fn summary(
         text.extend(["; ", &count(inferred, "inferred edge")]);
     }
     if !undrawn.is_empty() {
-        let mut reasons: BTreeMap<NotDrawn, usize> = BTreeMap::new();
-        for (reason, _) in undrawn {
-            *reasons.entry(*reason).or_default() += 1;
-        }
-        let reasons = reasons.iter().map(|(r, n)| format!("{n}: {}", r.word()));
-        let reasons = reasons.collect::<Vec<_>>().join(", ");
+        let reasons = tally(undrawn.iter().map(|(reason, _)| *reason)).into_iter();
+        let reasons = joined(reasons.map(|(r, n)| format!("{n}: {}", r.word())), ", ");
         let places = count(undrawn.len(), "place");
         text.extend(["; ", &places, " not drawn (", &reasons]);
         text += "); `bagreel info --source` lists them";

@@ -204,11 +204,10 @@ impl<'a> TopologyYaml<'a> {
             return Ok(None);
         };
         let seconds = value.as_f64().filter(|s| s.abs() < 9e9);
-        let nanos = seconds.map(|s| cast::to_i64(s * 1e9));
-        nanos.map_or_else(
-            || Err(self.wrong("start", &format!("`{value}` is not a number of seconds"))),
-            |n| Ok(Some(n)),
-        )
+        match seconds.map(|s| cast::to_i64(s * 1e9)) {
+            None => Err(self.wrong("start", &format!("`{value}` is not a number of seconds"))),
+            nanos => Ok(nanos),
+        }
     }
 }
 

@@ -64,10 +64,7 @@ pub(crate) fn anonymous(source: SourceId, known: &mut Conclusions<'_>) {
             continue;
         }
         let what = ElementKey::Node(node);
-        let when = Validity::Begins {
-            signs: vec![start.max(first)],
-            ends: Vec::new(),
-        };
+        let when = Validity::begin(start.max(first));
         let inference = Inference::new(source, what, Confidence::Stated, when);
         known.because(inference, Some(start), |known| {
             format!("the name {} contains this start time", known.text(node))

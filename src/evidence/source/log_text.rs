@@ -12,7 +12,7 @@ use crate::evidence::inference::{
     Conclusions, ElementKey, IncidentKind, Inference, Reliability, Stream, Validity, verb,
 };
 use crate::evidence::message::dynamic::{LogRecord, is_ros1_log};
-use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
+use crate::evidence::observation::{Confidence, Name, Observation, ObservationRecord, SourceId};
 use crate::evidence::source::{SHARED, SourceContext};
 use crate::evidence::source_id;
 
@@ -213,14 +213,19 @@ fn found_topic(text: &str) -> Option<&str> {
         .or_else(of_ros2)
 }
 
+/// The topics that recorders found, each with the times.
+fn found(known: &mut Conclusions<'_>) -> Vec<(Name, Vec<Stamp>)> {
+    let facts = known.observed(source_id("links")).into_iter();
+    let of = |fact: ObservationRecord| match fact.observation {
+        Observation::Appears(topic) => Some((topic, known.times(&fact))),
+        _ => None,
+    };
+    facts.filter_map(of).collect()
+}
+
 /// The topics that a recorder of all topics found when they began, with that time.
 fn births(known: &mut Conclusions<'_>) -> Vec<(Name, Stamp)> {
-    let mut found: Vec<(Name, Vec<Stamp>)> = Vec::new();
-    for fact in known.observed(source_id("links")) {
-        if let Observation::Appears(topic) = fact.observation {
-            found.push((topic, known.times(&fact)));
-        }
-    }
+    let mut found = found(known);
     // Another recorder that starts finds all topics again.
     let is_later = |from: Stamp, time: &&Stamp| time.since(from) > DISCOVERY_NS;
     let again = found.iter().flat_map(|(_, times)| {
@@ -262,22 +267,19 @@ pub(crate) fn conclude_births(source: SourceId, known: &mut Conclusions<'_>) {
         {
             continue;
         }
-        let nodes: BTreeSet<Option<Name>> =
-            streams.clone().map(|stream| stream.publisher).collect();
+        let publisher = |stream: &Stream| stream.publisher;
+        let nodes: BTreeSet<Option<Name>> = streams.clone().map(publisher).collect();
         let is_there = |stream: &&Stream| {
             let first = known.messages.and_then(|all| all.bounds(stream.times));
             nodes.len() == 1 || first.is_some_and(|of| of.0.since(birth) <= FOUND_NS)
         };
-        let there = streams.filter(is_there).map(|stream| stream.publisher);
-        for node in there.collect::<BTreeSet<_>>() {
+        let there: BTreeSet<_> = streams.filter(is_there).map(publisher).collect();
+        for node in there {
             let what = match node {
                 Some(node) => ElementKey::Publish(node, topic),
                 None => ElementKey::Topic(topic),
             };
-            let when = Validity::Begins {
-                signs: vec![birth],
-                ends: Vec::new(),
-            };
+            let when = Validity::begin(birth);
             let inference = Inference::new(source, what, Confidence::Stated, when);
             known.because(inference, Some(birth), |known| {
                 format!("the recorder found {} then", known.text(topic))
@@ -291,7 +293,11 @@ pub(crate) fn conclude_births(source: SourceId, known: &mut Conclusions<'_>) {
 // first logs at 101.2 s, with number 2: it sent number 1 before the recorder was connected, and would otherwise have been there at 0 s.
 
 pub(crate) fn conclude_connected(source: SourceId, known: &mut Conclusions<'_>) {
-    let recordings = recordings(known);
+    let mut recordings = recordings(known);
+    recordings.sort_unstable();
+    let Some(&(whole, _)) = recordings.iter().find(|(_, is_whole)| *is_whole) else {
+        return;
+    };
     // The first log record of each node, and whether it is not its first.
     let mut first: BTreeMap<Name, (Stamp, bool)> = BTreeMap::new();
     for fact in known.observed(source_id("rosout")) {
@@ -299,21 +305,16 @@ pub(crate) fn conclude_connected(source: SourceId, known: &mut Conclusions<'_>) 
             && let Some(time) = known.times(&fact).first()
         {
             let own = (*time, matches!(fact.observation, Observation::Continues(_)));
-            first
-                .entry(node)
-                .and_modify(|one| *one = own.min(*one))
-                .or_insert(own);
+            let one = first.entry(node).or_insert(own);
+            *one = own.min(*one);
         }
     }
     for (node, (time, _)) in first.into_iter().filter(|one| one.1.1) {
-        let mut before = recordings.iter().filter(|(start, _)| *start <= time);
-        let is_connected = before.clone().any(|(_, is_whole)| *is_whole);
-        if is_connected && before.all(|(start, _)| time.since(*start) > 2 * FOUND_NS) {
-            let when = Validity::Begins {
-                signs: vec![time],
-                ends: Vec::new(),
-            };
-            let what = ElementKey::Node(node);
+        let before = recordings.partition_point(|(start, _)| *start <= time);
+        let latest = recordings[..before].last();
+        let is_connected = latest.is_some_and(|(start, _)| time.since(*start) > 2 * FOUND_NS);
+        if whole <= time && is_connected {
+            let (what, when) = (ElementKey::Node(node), Validity::begin(time));
             let inference = Inference::new(source, what, Confidence::Stated, when);
             known.because(inference, Some(time), |known| {
                 let node = known.text(node);
@@ -325,13 +326,7 @@ pub(crate) fn conclude_connected(source: SourceId, known: &mut Conclusions<'_>) 
 
 /// The start of each recording, and whether its recorder started then: its log names most of the topics that are in it from the start.
 fn recordings(known: &mut Conclusions<'_>) -> Vec<(Stamp, bool)> {
-    let mut named: BTreeSet<(Name, Stamp)> = BTreeSet::new();
-    for fact in known.observed(source_id("links")) {
-        if let Observation::Appears(topic) = fact.observation {
-            let times = known.times(&fact).into_iter();
-            named.extend(times.map(|time| (topic, time)));
-        }
-    }
+    let found: BTreeMap<Name, Vec<Stamp>> = found(known).into_iter().collect();
     let first = |stream: &Stream| {
         let (first, _) = known.messages?.bounds(stream.times)?;
         Some((stream.bag, (first, stream.topic)))
@@ -343,12 +338,13 @@ fn recordings(known: &mut Conclusions<'_>) -> Vec<(Stamp, bool)> {
         let early = topics.iter().filter(|(first, _)| *first <= end);
         let early: BTreeSet<Name> = early.map(|one| one.1).collect();
         let is_named = |topic: &Name| {
-            let mut times = named.range((*topic, start)..=(*topic, end));
-            times.next().is_some()
+            let times = found.get(topic).map_or(&[][..], Vec::as_slice);
+            let next = times.partition_point(|time| *time < start);
+            times.get(next).is_some_and(|time| *time <= end)
         };
         let others = early.into_iter().filter(|topic| !known.is_log1(*topic));
-        let (found, missed): (Vec<Name>, Vec<Name>) = others.partition(is_named);
-        Some((start, found.len() >= missed.len()))
+        let (named, missed): (Vec<Name>, Vec<Name>) = others.partition(is_named);
+        Some((start, named.len() >= missed.len()))
     };
     bags.values().filter_map(recording).collect()
 }

@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use crate::base::name::{LOGS, in_space, is_log, is_player, role};
+use crate::base::name::{LOGS, in_space, is_log, is_player, role, with_spaces};
 use crate::base::rhythm::FIRST_RECORD;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
 use crate::evidence::message::dynamic::LogRecord;
@@ -25,9 +25,8 @@ pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
     let log = stream.topic;
     if is_log(stream.connection.topic.as_str()) {
         // A relay of `topic_tools` logs this when its input begins, however long it has waited.
-        let number = record
-            .number
-            .filter(|_| !text.starts_with("advertised as "));
+        let is_relay = text.starts_with("advertised as ");
+        let number = record.number.filter(|_| !is_relay);
         if number.is_some_and(|number| number <= FIRST_RECORD) {
             let begins = || format!("{name} logs its first record: {text}");
             context.states(Observation::Begins(node), begins);
@@ -256,12 +255,8 @@ fn generated(logger: &str) -> Option<&str> {
 
 /// The node that a logger belongs to. Shorter names come first, so that a part finds its node.
 fn owner<'a>(logger: &'a str, nodes: &BTreeSet<Arc<str>>) -> &'a str {
-    let mut above = logger;
-    while !above.is_empty() {
-        if nodes.contains(above) {
-            return above;
-        }
-        above = &above[..above.rfind('/').unwrap_or(0)];
+    if let Some(node) = with_spaces(logger).find(|name| nodes.contains(*name)) {
+        return node;
     }
     match logger.rsplit_once('/') {
         // Parts of ROS 2 itself log below the name of their node.

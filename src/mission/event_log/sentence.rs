@@ -33,7 +33,7 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EventId], event: &Event) -> 
     let lasted = event.lasted().map(words::duration);
     match (&event.detail, event.kind) {
         (Detail::Rates { from_hz, to_hz }, _) => {
-            let change = words::rate_change(*from_hz, *to_hz);
+            let change = words::rates(&[*from_hz, *to_hz]);
             format!("{change}{}", too(mission, parts, event))
         }
         (Detail::Senders { from, to }, _) => {

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Bound;
 use std::sync::Arc;
 
-use crate::base::ids::grouped;
+use crate::base::ids::{grouped, tally};
 use crate::base::name::{lies_in, namespace};
 use crate::graph::Element;
 use crate::mission::Mission;
@@ -120,13 +120,11 @@ pub(crate) fn headlines(mission: &Mission) -> impl Iterator<Item = Element> + '_
 
 /// The number of headlines about each name: of a node, of a topic, of an edge by its topic.
 pub(crate) fn changed(mission: &Mission) -> BTreeMap<&str, usize> {
-    let (elements, mut changed) = (&mission.elements, BTreeMap::new());
-    for what in headlines(mission) {
-        let (node, topic) = elements.names(what);
-        let name = node.or(topic);
-        *changed.entry(name.unwrap_or_default()).or_default() += 1;
-    }
-    changed
+    let name = |what| {
+        let (node, topic) = mission.elements.names(what);
+        node.or(topic).unwrap_or_default()
+    };
+    tally(headlines(mission).map(name))
 }
 
 /// The values of the names that lie in a namespace.
@@ -276,10 +274,7 @@ fn parent(space: &str) -> &str {
 
 /// Drops namespaces around a single item, which then belongs to the next outer one.
 fn fold(spaces: &mut BTreeSet<&str>, inner: &[String], always: &BTreeSet<&str>) {
-    let mut things: BTreeMap<&str, usize> = BTreeMap::new();
-    for space in inner {
-        *things.entry(space).or_default() += 1;
-    }
+    let mut things = tally(inner.iter().map(String::as_str));
     let mut kept = BTreeSet::new();
     // Backwards, a namespace comes after those inside it.
     for space in spaces.iter().rev().copied() {
