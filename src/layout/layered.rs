@@ -378,7 +378,7 @@ fn best_block(task: PartTask<'_>, orderings: &[Ordering]) -> PlacedPart {
     if options.least.is_infinite() || pack::fit(best.1.size, options.page) >= 1.0 {
         return best.1;
     }
-    blocks::best(task).into_iter().fold(best, better).1
+    blocks::best(task, best.0).map_or(best.1, |blocks| blocks.1)
 }
 
 fn block(task: PartTask<'_>, Ordering { layers, order }: &Ordering) -> PlacedPart {

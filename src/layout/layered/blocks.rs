@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 
 use super::parts::Subplan;
-use super::{Draft, PlacedPart};
+use super::{Draft, PlacedPart, ROUNDING};
 use crate::base::geometry::{Point, Rect, Size, polyline};
 use crate::layout::routes::around::{End, Map, meets};
 use crate::layout::routes::{PORT_STEP, PORTS};
@@ -24,31 +24,35 @@ const SHAPES: [f64; 3] = [0.3, 1.0, 3.0];
 const PIECES: u32 = 3;
 
 /// The part with its outermost namespaces as blocks, in the way that is judged best, and its quality: with all contents
-/// on pages of one shape, and for a drawing that fills the page, each in its own. `None` if it has no
-/// namespace or only one around everything, or something is too large.
-pub(crate) fn best(task: PartTask<'_>) -> Option<(f64, PlacedPart)> {
+/// on pages of one shape, and for a drawing that fills the page, each in its own. `None` if its quality is not above `least`, if it
+/// has no namespace or only one around everything, or if something is too large.
+pub(crate) fn best(task: PartTask<'_>, least: f64) -> Option<(f64, PlacedPart)> {
     let blocks = Blocks::new(task)?;
-    let judged = |shapes: Vec<usize>| {
-        let placed = blocks.placed(&shapes)?;
-        Some((task.judged(&placed), placed, shapes))
-    };
-    let better = |best: (f64, PlacedPart, Vec<usize>), next: (f64, PlacedPart, Vec<usize>)| {
-        if next.0 > best.0 { next } else { best }
-    };
     let many = blocks.contents.len();
-    let equal = (0..SHAPES.len()).map(|shape| vec![shape; many]);
-    let mut best = equal.filter_map(judged).reduce(better)?;
+    let mut best = None;
+    for shape in 0..SHAPES.len() {
+        blocks.try_shapes(&vec![shape; many], least, &mut best);
+    }
+    let size = |at: usize, shape: usize| blocks.contents[at][shape].layout.size;
     for at in (0..many).filter(|_| task.options.is_tight) {
         for shape in 0..SHAPES.len() {
-            let mut shapes = best.2.clone();
-            if blocks.contents[at][shape].layout.size != blocks.contents[at][shapes[at]].layout.size
-            {
+            let mut shapes = best.as_ref()?.shapes.clone();
+            if size(at, shape) != size(at, shapes[at]) {
                 shapes[at] = shape;
-                best = judged(shapes).into_iter().fold(best, better);
+                blocks.try_shapes(&shapes, least, &mut best);
             }
         }
     }
-    Some((best.0, best.1))
+    let best = best.filter(|best| best.quality > least)?;
+    let placed = blocks.connected(blocks.laid_out(&best.shapes)?, true)?;
+    Some((best.quality, placed))
+}
+
+/// The best way so far.
+struct Best {
+    quality: f64,
+    /// The shape of the contents of each namespace.
+    shapes: Vec<usize>,
 }
 
 /// The contents of a namespace with a layout.
@@ -92,8 +96,38 @@ impl<'a> Blocks<'a> {
         })
     }
 
-    /// The part with the contents of each namespace in one of the shapes; `None` if a route is blocked.
-    fn placed(&self, shapes: &[usize]) -> Option<PlacedPart> {
+    /// Keeps the drawing with the contents of each namespace in these shapes if it is better than the best so far. Many cannot be
+    /// better than that or than `least`, which shows before their routes are connected.
+    fn try_shapes(&self, shapes: &[usize], least: f64, best: &mut Option<Best>) {
+        let old = best.as_ref().map_or(0.0, |best| best.quality);
+        let draft = self.laid_out(shapes);
+        let draft = draft.filter(|draft| self.hope(draft) > old.max(least));
+        let placed = draft.and_then(|draft| self.connected(draft, false));
+        let quality = placed.map_or(0.0, |placed| self.task.judged(&placed));
+        if quality > old {
+            let shapes = shapes.to_vec();
+            *best = Some(Best { quality, shapes });
+        }
+    }
+
+    /// The quality of a draft if no line crosses another and each is straight.
+    fn hope(&self, draft: &PlacedPart) -> f64 {
+        let apart = |(from, to): &(usize, usize)| {
+            let (a, b) = (draft.boxes[*from], draft.boxes[*to]);
+            let gap = Point::new(
+                (b.x - a.right()).max(a.x - b.right()).max(0.0),
+                (b.y - a.bottom()).max(a.y - b.bottom()).max(0.0),
+            );
+            gap.distance(Point::default())
+        };
+        let length = self.task.part.ends.iter().map(apart).sum();
+        let size = turned(draft.size, self.task.orientation);
+        self.task.quality(size, (0, length)) * ROUNDING
+    }
+
+    /// The part with the contents of each namespace in one of the shapes, x along and y across; routes between namespaces end at
+    /// their frames.
+    fn laid_out(&self, shapes: &[usize]) -> Option<PlacedPart> {
         let (PartTask { plan, part, .. }, cut) = (self.task, &self.cut);
         let chosen = self.contents.iter().zip(shapes);
         let chosen: Vec<&Contents> = chosen.map(|(all, shape)| &all[*shape]).collect();
@@ -120,14 +154,25 @@ impl<'a> Blocks<'a> {
             placed.routes[link] = route;
         }
         // The way between along and across and the page is the same in both directions.
-        let mut placed = placed.on_page(self.task.orientation);
+        Some(placed.on_page(self.task.orientation))
+    }
+
+    /// The part with the routes between namespaces led on to their boxes, with `is_last` around words, too, if nothing is in the way
+    /// there; on the page. `None` if one is blocked.
+    fn connected(&self, mut placed: PlacedPart, is_last: bool) -> Option<PlacedPart> {
+        let (PartTask { plan, part, .. }, cut) = (self.task, &self.cut);
         let routes = placed.routes.clone();
         let turns = cut.connect(plan, part, &mut placed, &[])?;
-        // Around words as well, if nothing is in the way there: that is no reason to prefer another drawing.
-        let words = self.words(&placed);
-        let through = std::mem::replace(&mut placed.routes, routes);
-        if words.is_empty() || cut.connect(plan, part, &mut placed, &words).is_none() {
-            placed.routes = through;
+        let words = if is_last {
+            self.words(&placed)
+        } else {
+            Vec::new()
+        };
+        if !words.is_empty() {
+            let through = std::mem::replace(&mut placed.routes, routes);
+            if cut.connect(plan, part, &mut placed, &words).is_none() {
+                placed.routes = through;
+            }
         }
         let lines: Vec<Line> = placed.routes.iter().map(Line::new).collect();
         placed.crossings = turns + crossings(&lines);
@@ -236,72 +281,127 @@ impl Cut {
     ) -> Option<u64> {
         let mut turns = 0;
         let mut map = Map::new(&[&placed.boxes, words].concat());
-        // The ports of lines inside of a namespace, on each side of its boxes.
-        let mut taken: BTreeMap<(usize, bool), Vec<f64>> = BTreeMap::new();
-        let inside = (0..part.ends.len()).filter(|link| self.between.binary_search(link).is_err());
-        for (route, (from, to)) in inside.map(|link| (&placed.routes[link], part.ends[link])) {
-            let end = route.points().next_back().unwrap_or(route.start);
-            for (v, port) in [(from, route.start), (to, end)] {
-                let centre = placed.boxes[v].centre();
-                let ports = taken.entry((v, port.x > centre.x)).or_default();
-                ports.push(port.y - centre.y);
+        let mut sides: BTreeMap<(usize, bool), Vec<Port>> = BTreeMap::new();
+        for (link, &(from, to)) in part.ends.iter().enumerate() {
+            let is_inner = self.between.binary_search(&link).is_err();
+            for (v, is_end) in [(from, false), (to, true)] {
+                let line = LineEnd { link, is_end };
+                let (route, rect) = (line.route(placed), placed.boxes[v]);
+                let first = route.curves.first().filter(|_| is_inner);
+                let end = Port {
+                    line,
+                    is_inner,
+                    aside: route.start.y - rect.centre().y,
+                    height: first.map_or(route.start.y, |first| first[2].y),
+                };
+                // Lines around rows of boxes may meet their boxes from above or below.
+                if self.space[v] != 0 && (!is_inner || end.aside.abs() <= rect.h * PORTS / 2.0) {
+                    let is_after = route.start.x > rect.centre().x;
+                    sides.entry((v, is_after)).or_default().push(end);
+                }
             }
         }
-        for is_end in [true, false] {
-            let mut sides: BTreeMap<(usize, bool), Vec<usize>> = BTreeMap::new();
-            for &link in &self.between {
-                let (from, to) = part.ends[link];
-                let v = if is_end { to } else { from };
-                placed.routes[link] = placed.routes[link].backwards();
-                if self.space[v] != 0 {
-                    let is_after = placed.routes[link].start.x > placed.boxes[v].centre().x;
-                    sides.entry((v, is_after)).or_default().push(link);
-                }
-            }
-            for ((v, is_after), mut links) in sides {
-                let y = |link: &usize| placed.routes[*link].start.y;
-                links.sort_by(|a, b| y(a).total_cmp(&y(b)).then(a.cmp(b)));
-                let end = End {
-                    at: v,
-                    rect: placed.boxes[v],
-                    outline: plan.vertices[part.vertices[v]].outline,
+        for ((v, _), mut ports) in sides {
+            let end = End {
+                at: v,
+                rect: placed.boxes[v],
+                outline: plan.vertices[part.vertices[v]].outline,
+            };
+            spread(&mut ports, end.rect.h * PORTS);
+            for port in ports {
+                let route = port.line.route(placed);
+                let (route, is_level) = if port.is_inner {
+                    (end.moved(&route, port.aside), true)
+                } else {
+                    map.led_on(&route, end, port.aside)?
                 };
-                let taken = taken.get(&(v, is_after)).map_or(&[][..], Vec::as_slice);
-                let ports = ports(links.len(), taken, end.rect.h * PORTS);
-                for (link, aside) in links.into_iter().zip(ports) {
-                    let (route, is_level) = map.led_on(&placed.routes[link], end, aside)?;
-                    placed.routes[link] = route;
-                    turns += u64::from(!is_level);
-                }
+                port.line.set(placed, route);
+                turns += u64::from(!is_level);
             }
         }
         Some(turns)
     }
 }
 
-/// The distances of new ports from the middle of a side, on the part of it for ports, which is `long`: side by side, or where
-/// those that are `taken` are in the way, the places closest to the middle.
-fn ports(many: usize, taken: &[f64], long: f64) -> Vec<f64> {
-    let step = PORT_STEP.min(long / (many + taken.len()) as f64);
-    let beside = (0..many).map(|nth| (nth as f64 - (many as f64 - 1.0) / 2.0) * step);
-    let is_free = |all: &[f64], at: f64| all.iter().all(|port| (port - at).abs() >= step);
-    let is_clear = beside.clone().all(|at| is_free(taken, at));
-    let near = (0..40_u32).map(|nth| f64::from(nth) * step / 4.0);
-    let near = near
-        .flat_map(|at| [at, -at])
-        .filter(|at| at.abs() <= long / 2.0 && !is_clear);
-    let mut all = taken.to_vec();
-    for at in near {
-        if all.len() < many + taken.len() && is_free(&all, at) {
-            all.push(at);
+/// An end of a line.
+struct LineEnd {
+    link: usize,
+    /// Whether the line ends there; otherwise it begins there.
+    is_end: bool,
+}
+
+impl LineEnd {
+    /// The line's route from this end.
+    fn route(&self, placed: &PlacedPart) -> Route {
+        let route = &placed.routes[self.link];
+        if self.is_end {
+            route.backwards()
+        } else {
+            route.clone()
         }
     }
-    let mut ports = all.split_off(taken.len());
-    ports.sort_by(f64::total_cmp);
-    if ports.len() == many {
-        ports
+
+    /// Changes the line's route to this one from this end.
+    fn set(&self, placed: &mut PlacedPart, route: Route) {
+        placed.routes[self.link] = if self.is_end {
+            route.backwards()
+        } else {
+            route
+        };
+    }
+}
+
+/// The port of a line at a box in a namespace.
+struct Port {
+    line: LineEnd,
+    /// Whether the other end of the line is in the same namespace.
+    is_inner: bool,
+    /// Its distance from the middle of the side; at first, for a line from outside, that of the line at the frame.
+    aside: f64,
+    /// The height from which the line comes.
+    height: f64,
+}
+
+/// Gives ports at one side of a box, of which the part for ports is `long`, their places: those of lines from outside side by side or,
+/// where those of lines from inside are in the way, as close to the middle as possible. Only if there is no room, all move.
+fn spread(ports: &mut Vec<Port>, long: f64) {
+    ports.sort_by(|a, b| {
+        let height = a.height.total_cmp(&b.height);
+        height.then(a.aside.total_cmp(&b.aside))
+    });
+    // Lines that fork behind their port keep one.
+    let is_one =
+        |a: &Port, b: &Port| a.is_inner && b.is_inner && a.aside.total_cmp(&b.aside).is_eq();
+    let many = ports.chunk_by(is_one).count();
+    let step = PORT_STEP.min(long / many as f64);
+    let side_by_side = |many: usize| {
+        let middle = (many as f64 - 1.0) / 2.0;
+        (0..many).map(move |nth| (nth as f64 - middle) * step)
+    };
+    let (inner, outer): (Vec<&Port>, Vec<&Port>) = ports.iter().partition(|port| port.is_inner);
+    // Towards where they come from first.
+    let side = outer.iter().map(|port| port.aside).sum::<f64>().signum();
+    let shifts = (0..40_u32).map(|nth| f64::from(nth) * step / 4.0);
+    let shifts = shifts.flat_map(|by| [by * side, -by * side]);
+    let mut rows = shifts.map(|by| {
+        side_by_side(outer.len())
+            .map(|at| at + by)
+            .collect::<Vec<f64>>()
+    });
+    let is_free = |at: &f64| {
+        let is_apart = |port: &&Port| (port.aside - at).abs() >= step;
+        at.abs() <= long / 2.0 && inner.iter().all(is_apart)
+    };
+    let places = if let Some(free) = rows.find(|places| places.iter().all(is_free)) {
+        ports.retain(|port| !port.is_inner);
+        free
     } else {
-        beside.collect()
+        side_by_side(many).collect()
+    };
+    for (same, place) in ports.chunk_by_mut(is_one).zip(places) {
+        for port in same {
+            port.aside = place;
+        }
     }
 }
 
@@ -351,4 +451,41 @@ fn crossings(lines: &[Line]) -> u64 {
 fn crosses([a, b]: [Point; 2], [c, d]: [Point; 2]) -> bool {
     let side = |p: Point, q: Point, r: Point| (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x);
     side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The places of ports for lines from these heights, inner ones at these places.
+    fn spread(outer: &[f64], inner: &[(f64, f64)], long: f64) -> Vec<(bool, f64)> {
+        let port = |height: f64, aside: f64, is_inner: bool| Port {
+            line: LineEnd {
+                link: 0,
+                is_end: true,
+            },
+            is_inner,
+            aside,
+            height,
+        };
+        let outer = outer.iter().map(|height| port(*height, *height, false));
+        let inner = inner.iter().map(|(height, at)| port(*height, *at, true));
+        let mut ports = outer.chain(inner).collect();
+        super::spread(&mut ports, long);
+        let places = ports.iter().map(|port| (port.is_inner, port.aside));
+        places.collect()
+    }
+
+    #[test]
+    fn ports_of_a_box_are_apart_in_the_order_of_their_lines() {
+        let free = spread(&[70.0, 20.0], &[(0.0, -20.0)], 50.0);
+        assert_eq!(free, [(false, -4.5), (false, 4.5)]);
+        let all = spread(&[70.0, -20.0], &[(0.0, -8.0), (90.0, 8.0)], 24.0);
+        let places = [(false, -9.0), (true, -3.0), (false, 3.0), (true, 9.0)];
+        assert_eq!(all, places);
+        let beside = spread(&[-30.0], &[(0.0, 0.0)], 50.0);
+        assert_eq!(beside, [(false, -9.0)]);
+        let forked = spread(&[30.0], &[(0.0, 0.0), (5.0, 0.0)], 8.0);
+        assert_eq!(forked, [(false, 4.0)]);
+    }
 }

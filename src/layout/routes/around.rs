@@ -17,6 +17,8 @@ const PARALLEL: f64 = 6.0;
 /// The number of pairs of line and box that may be checked for all edges together; the remaining edges are
 /// straight.
 const EFFORT: usize = 40_000_000;
+/// The effort of a possible step: as the steps of a path wait together, it also bounds their memory, to 100 MB.
+const STEP: usize = 16;
 
 /// A route per link, and the number of them that run through other boxes because no route was found.
 pub(crate) fn routes(plan: &Plan, boxes: &[Rect]) -> (Vec<Route>, usize) {
@@ -137,6 +139,21 @@ impl End {
         let (start, end) = (foot(x - half), foot(x + half));
         let arc = [Point::new(start.x, top), Point::new(end.x, top), end];
         Route::new(start, vec![arc])
+    }
+
+    /// A route that starts at a side of the box with its start `aside` of the middle of that side.
+    pub(crate) fn moved(&self, route: &Route, aside: f64) -> Route {
+        let y = self.rect.centre().y + aside;
+        let mut moved = route.raised(y);
+        moved.start = self.beside(y, route.start.x);
+        moved
+    }
+
+    /// The point of the outline at height `y`, on the side of a point at `x`.
+    fn beside(&self, y: f64, x: f64) -> Point {
+        let middle = self.rect.centre().x;
+        let beyond = middle + self.rect.w.copysign(x - middle);
+        self.leaves(Point::new(middle, y), Point::new(beyond, y))
     }
 
     /// The point where the line from a point inside to a point outside leaves the outline.
@@ -263,8 +280,16 @@ impl Map {
                 return Some((route.raised(lane.y).along(&[start, lane]), false));
             }
         }
-        let mut way = self.way(middle, from, own)?;
-        way[0] = end.leaves(way[0], way[1]);
+        // The side of the box towards the way from its middle has the port.
+        let next = self.way(middle, from, own)?[1];
+        let out = end.leaves(middle, next);
+        let is_beside = (out.y - middle.y).abs() < end.rect.h / 2.0 - SAME;
+        let port = if is_beside {
+            end.beside(level.y, next.x)
+        } else {
+            end.leaves(foot, Point::new(foot.x, next.y))
+        };
+        let mut way = self.way(port, from, own)?;
         way.pop();
         Some((route.along(&way), false))
     }
@@ -293,27 +318,26 @@ impl Map {
         }
         let mut points = vec![a, b];
         points.extend(&self.corners);
-        let mut best = vec![f64::INFINITY; points.len()];
-        let mut from = vec![0; points.len()];
-        let mut done = vec![false; points.len()];
-        best[0] = 0.0;
-        // Lengths are not negative, so their bits have the same order.
-        let mut queue = BinaryHeap::from([(Reverse(a.distance(b).to_bits()), 0)]);
-        while let Some((_, at)) = queue.pop() {
+        let rest: Vec<f64> = points.iter().map(|point| point.distance(b)).collect();
+        // The point before each one on the shortest path to it.
+        let mut from = vec![None; points.len()];
+        // Steps by the length of a path with them at least. Lengths are not negative, so their bits have the same order. Whether a
+        // step is free is checked when it is taken: most never are.
+        let mut steps = BinaryHeap::from([(Reverse(rest[0].to_bits()), 0.0_f64.to_bits(), 0, 0)]);
+        while let Some((_, length, at, before)) = steps.pop() {
+            let is_free = |map: &mut Self| at == 0 || map.clear(points[before], points[at], own);
+            if from[at].is_some() || !is_free(self) {
+                continue;
+            }
+            from[at] = Some(before);
             if at == 1 {
                 return Some(traced(&points, &from));
             }
-            if std::mem::replace(&mut done[at], true) {
-                continue;
-            }
-            for next in 1..points.len() {
-                let length = best[at] + points[at].distance(points[next]);
-                if done[next] || length >= best[next] || !self.clear(points[at], points[next], own)
-                {
-                    continue;
-                }
-                (best[next], from[next]) = (length, at);
-                queue.push((Reverse((length + points[next].distance(b)).to_bits()), next));
+            self.effort = self.effort.saturating_sub(STEP * points.len());
+            for next in (1..points.len()).filter(|next| from[*next].is_none()) {
+                let length = f64::from_bits(length) + points[at].distance(points[next]);
+                let whole = length + rest[next];
+                steps.push((Reverse(whole.to_bits()), length.to_bits(), next, at));
             }
         }
         None
@@ -333,11 +357,11 @@ impl Map {
 }
 
 /// The points on the path to the second one.
-fn traced(points: &[Point], from: &[usize]) -> Vec<Point> {
+fn traced(points: &[Point], from: &[Option<usize>]) -> Vec<Point> {
     let mut way = vec![points[1]];
     let mut at = 1;
-    while at != 0 {
-        at = from[at];
+    while let Some(before) = from[at].filter(|_| at != 0) {
+        at = before;
         way.push(points[at]);
     }
     way.reverse();
