@@ -5,8 +5,9 @@ mod law;
 mod recorders;
 
 use std::fs;
+use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, ChildStdout, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime};
 
@@ -26,14 +27,22 @@ fn bagreel(folder: &Path, args: &[&str]) -> Command {
     run
 }
 
+/// Longer than a busy machine lets a recorder wait between two writes.
+const IDLE: &str = "4s";
+
 /// Follows a recording as soon as its format can be detected.
 fn follow(folder: &Path, what: &str) -> Child {
-    bagreel(
-        folder,
-        &["follow", what, "--idle", "1500ms", "-o", "f.json"],
-    )
-    .spawn()
-    .unwrap()
+    bagreel(folder, &["follow", what, "--idle", IDLE, "-o", "f.json"])
+        .spawn()
+        .unwrap()
+}
+
+/// What a follower prints; its first line is read at once. From then on it notes signals.
+fn begun(follower: &mut Child) -> (BufReader<ChildStdout>, String) {
+    let mut lines = BufReader::new(follower.stdout.take().unwrap());
+    let mut first = String::new();
+    lines.read_line(&mut first).unwrap();
+    (lines, first)
 }
 
 fn output(folder: &Path, args: &[&str]) -> Output {
@@ -132,7 +141,7 @@ fn following_a_database_never_locks_it() {
         db.execute_batch(pragmas).unwrap();
         // Like rosbag2, without any timeout.
         db.busy_timeout(Duration::ZERO).unwrap();
-        let follower = bagreel(folder.path(), &["follow", "r.db3", "--idle", "1s"])
+        let follower = bagreel(folder.path(), &["follow", "r.db3", "--idle", IDLE])
             .spawn()
             .unwrap();
         let begun = Instant::now();
@@ -167,7 +176,7 @@ fn a_signal_ends_following_and_writes_the_outputs() {
     let mut follower = bagreel(folder.path(), &["follow", "r.bag.active", "-o", "f.json"])
         .spawn()
         .unwrap();
-    sleep(Duration::from_millis(1500));
+    let (mut lines, mut said) = begun(&mut follower);
     assert!(follower.try_wait().unwrap().is_none(), "it follows on");
     // Twice, as `timeout` does.
     let id = follower.id().to_string();
@@ -177,9 +186,8 @@ fn a_signal_ends_following_and_writes_the_outputs() {
         follower.kill().unwrap();
         return;
     }
-    let done = follower.wait_with_output().unwrap();
-    assert_eq!(done.status.code(), Some(0));
-    let said = String::from_utf8_lossy(&done.stdout);
+    lines.read_to_string(&mut said).unwrap();
+    assert_eq!(follower.wait().unwrap().code(), Some(0));
     assert!(said.contains("/planner → /joystick"), "{said}");
     assert!(folder.path().join("f.json").is_file());
 }
@@ -203,7 +211,7 @@ fn a_second_signal_ends_the_writing_of_outputs() {
     let mut follower = bagreel(folder.path(), &args).spawn().unwrap();
     let id = follower.id().to_string();
     let interrupt = || Command::new("kill").args(["-INT", &id]).status().unwrap();
-    sleep(Duration::from_millis(1500));
+    let _lines = begun(&mut follower);
     assert!(interrupt().success() && follower.try_wait().unwrap().is_none());
     // Opens when it is written to.
     let unread = fs::File::open(&pipe).unwrap();

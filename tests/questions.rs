@@ -1,10 +1,9 @@
 //! Tests of the questions that people ask of recordings, each answered by one command of the recipes.
 
 use std::fs;
+use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
-use std::thread::sleep;
-use std::time::Duration;
 
 use serde_json::Value;
 
@@ -285,18 +284,19 @@ fn a_recording_that_is_not_there_yet_is_awaited() {
     follow
         .current_dir(here)
         .args(["follow", "r.bag", "--format", "ndjson", "--idle", "20s"]);
-    let follow = follow
+    let mut follow = follow
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    sleep(Duration::from_millis(400));
+    let mut said = String::new();
+    let mut notes = BufReader::new(follow.stderr.take().unwrap());
+    notes.read_line(&mut said).unwrap();
+    assert_eq!(said, "note: waiting for `r.bag`\n");
     fs::write(here.join("new"), write(&small(), Pack::Lz4, 20_000)).unwrap();
     fs::rename(here.join("new"), here.join("r.bag")).unwrap();
     let done = follow.wait_with_output().unwrap();
     assert!(done.status.success(), "{done:?}");
-    let said = String::from_utf8(done.stderr).unwrap();
-    assert!(said.contains("note: waiting for `r.bag`"), "{said}");
     // Each event keeps its number.
     let mut of_event = std::collections::BTreeMap::new();
     for line in String::from_utf8(done.stdout).unwrap().lines() {

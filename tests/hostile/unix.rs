@@ -124,8 +124,9 @@ fn a_signal_while_writing_leaves_no_files() {
     let args = [
         "render",
         warehouse,
+        // Enough frames for several seconds on a fast machine.
         "-p",
-        "1",
+        "0.2",
         "--frame-ms",
         "50",
         "-o",
