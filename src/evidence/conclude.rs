@@ -20,7 +20,7 @@ use crate::evidence::inference::{
 use crate::evidence::observation::{LoggedText, Measurement, Name, Observation, Observations};
 use crate::evidence::source::contract::Owners;
 use crate::evidence::times::Stamps;
-use crate::evidence::{Confidence, EvidenceLine, SOURCES, source_id, unknown};
+use crate::evidence::{Confidence, EvidenceLine, SOURCES, source_id, source_word, unknown};
 
 #[cfg(feature = "source")]
 use crate::evidence::code::{Code, matching};
@@ -165,8 +165,9 @@ fn concluded<'a>(
     let mut known = Conclusions::new(streams, &recorded.messages, facts, (start, end));
     known.take_at_their_word();
     for (row, source) in SOURCES.iter().enumerate() {
+        known.source = row;
         for conclude in source.conclude {
-            conclude(row, &mut known);
+            conclude(&mut known);
         }
     }
     let unmatched = unmatched(&known, &options.topology.entries);
@@ -253,20 +254,17 @@ fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
         known.facts.is_watched(inference.what.ends())
             && !known.worded.contains(&(inference.what, inference.source))
     };
-    let mut pieces = Vec::new();
-    for inference in known.inferences.iter().filter(is_asked) {
-        if let (Some(source), Some((time, text))) = (
-            SOURCES.get(inference.source),
-            explained(known, messages, inference),
-        ) {
-            pieces.push(EvidenceLine {
-                time,
-                source: source.word,
-                confidence: inference.confidence,
-                text,
-            });
-        }
-    }
+    let asked = known.inferences.iter().filter(is_asked);
+    let pieces = asked.filter_map(|inference| {
+        let (time, text) = explained(known, messages, inference)?;
+        Some(EvidenceLine {
+            time,
+            source: source_word(inference.source),
+            confidence: inference.confidence,
+            text,
+        })
+    });
+    let pieces: Vec<EvidenceLine> = pieces.collect();
     known.facts.pieces.extend(pieces);
 }
 
@@ -360,22 +358,18 @@ fn stated(
     } else {
         ("topology", Confidence::Stated)
     };
-    let source = source_id(word);
+    known.source = source_id(word);
     if known.facts.is_watched(what.ends()) {
-        known.facts.pieces.push(EvidenceLine {
-            time: None,
-            source: word,
-            confidence,
-            text: entry.place.clone(),
-        });
+        let text = entry.place.clone();
+        known.facts.explain(known.source, confidence, None, text);
     }
-    let inference = |when| Inference::new(source, what, confidence, when);
-    known.add(inference(when));
+    known.add(what, confidence, when);
     // The time of its launch is unknown: assume that it exists while others in its namespace do.
     if entry.declared
         && let Some(neighbour) = neighbour(known, what, messages)
     {
-        known.add(inference(Validity::Like(ElementKey::Node(neighbour))));
+        let when = Validity::Like(ElementKey::Node(neighbour));
+        known.add(what, confidence, when);
     }
 }
 

@@ -11,8 +11,7 @@ use crate::base::rhythm::CLOSE_NS;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::message::dynamic::is_ros1_log;
 use crate::evidence::observation::{
-    Confidence, EvidenceLine, LoggedText, Name, Observation, ObservationRecord, Observations,
-    SourceId,
+    Confidence, LoggedText, Name, Observation, ObservationRecord, Observations, SourceId,
 };
 use crate::evidence::times::{SeriesId, Stamps};
 use crate::evidence::{SOURCES, source_word};
@@ -144,20 +143,6 @@ pub(crate) struct Inference {
 }
 
 impl Inference {
-    pub(crate) fn new(
-        source: SourceId,
-        what: ElementKey,
-        confidence: Confidence,
-        when: Validity,
-    ) -> Self {
-        Self {
-            what,
-            source,
-            confidence,
-            when,
-        }
-    }
-
     /// Renumbers the names.
     pub(crate) fn rename(&mut self, to: &impl Fn(Name) -> Name) {
         self.what = self.what.renamed(to);
@@ -186,6 +171,8 @@ fn gone(streams: &[Stream]) -> BTreeSet<Option<Name>> {
 /// Everything known about a mission once all bags are read, and the conclusions so far.
 #[derive(Default)]
 pub(crate) struct Conclusions<'a> {
+    /// The source that concludes now: what is added is from it.
+    pub(crate) source: SourceId,
     pub(crate) streams: &'a [Stream],
     /// The log times of the streams' messages.
     pub(crate) messages: Option<&'a Stamps>,
@@ -237,10 +224,10 @@ impl<'a> Conclusions<'a> {
     }
 
     /// Adds an inference.
-    pub(crate) fn add(&mut self, inference: Inference) {
-        let [node, _] = inference.what.ends();
+    pub(crate) fn add(&mut self, what: ElementKey, confidence: Confidence, when: Validity) {
+        let [node, _] = what.ends();
         self.nodes.extend(node);
-        match inference.what {
+        match what {
             ElementKey::Subscribe(topic, node) => {
                 self.subscribers.grown(topic).insert(node);
             }
@@ -249,42 +236,42 @@ impl<'a> Conclusions<'a> {
             }
             ElementKey::Node(_) | ElementKey::Topic(_) => {}
         }
-        self.inferences.push(inference);
+        self.inferences.push(Inference {
+            what,
+            source: self.source,
+            confidence,
+            when,
+        });
     }
 
     /// Adds an inference, with its explanation for `why`; `time` if it belongs to one.
     pub(crate) fn because(
         &mut self,
-        inference: Inference,
+        what: ElementKey,
+        confidence: Confidence,
+        when: Validity,
         time: Option<Stamp>,
         words: impl FnOnce(&Self) -> String,
     ) {
-        if self.facts.is_watched(inference.what.ends()) {
+        if self.facts.is_watched(what.ends()) {
             let text = words(self);
-            self.worded.insert((inference.what, inference.source));
-            self.facts.pieces.push(EvidenceLine {
-                time,
-                source: source_word(inference.source),
-                confidence: inference.confidence,
-                text,
-            });
+            self.worded.insert((what, self.source));
+            self.facts.explain(self.source, confidence, time, text);
         }
-        self.add(inference);
+        self.add(what, confidence, when);
     }
 
     /// Adds the inference of a rule, valid as long as `basis`, unless the element is known already or
     /// stronger evidence contradicts it.
     pub(crate) fn infer(
         &mut self,
-        source: SourceId,
         what: ElementKey,
         basis: ElementKey,
         words: impl FnOnce(&Self) -> String,
     ) {
         if !self.knows(what) && !self.denies(what) {
             let when = Validity::Like(basis);
-            let inference = Inference::new(source, what, Confidence::Inferred, when);
-            self.because(inference, None, words);
+            self.because(what, Confidence::Inferred, when, None, words);
         }
     }
 
@@ -292,7 +279,6 @@ impl<'a> Conclusions<'a> {
     /// messages.
     pub(crate) fn infer_publisher(
         &mut self,
-        source: SourceId,
         node: Name,
         topic: Name,
         words: impl Fn(&Self) -> String,
@@ -304,8 +290,7 @@ impl<'a> Conclusions<'a> {
         for at in self.recorded.of(topic).to_vec() {
             if self.streams[at].publisher.is_none() {
                 let when = Validity::Messages(at);
-                let inference = Inference::new(source, what, Confidence::Inferred, when);
-                self.because(inference, None, &words);
+                self.because(what, Confidence::Inferred, when, None, &words);
             }
         }
     }
@@ -446,24 +431,10 @@ impl<'a> Conclusions<'a> {
 
     /// Adds `what` by a convention: it exists as long as `basis`, unless a complete list omits it. Headers do
     /// not contradict it, as a topic published by convention is often silent.
-    pub(crate) fn like(&mut self, source: SourceId, what: ElementKey, basis: ElementKey) {
-        if self.closed(|closed| closed.settled_lists_deny(what)) {
-            return;
+    pub(crate) fn like(&mut self, what: ElementKey, basis: ElementKey) {
+        if !self.closed(|closed| closed.settled_lists_deny(what)) {
+            self.add(what, Confidence::Inferred, Validity::Like(basis));
         }
-        let when = Validity::Like(basis);
-        self.add(Inference::new(source, what, Confidence::Inferred, when));
-    }
-
-    /// Adds, by a convention, a subscription to `topic` by a node that publishes `basis`.
-    pub(crate) fn subscribes_as_well(
-        &mut self,
-        source: SourceId,
-        node: Name,
-        basis: Name,
-        topic: Name,
-    ) {
-        let basis = ElementKey::Publish(node, basis);
-        self.like(source, ElementKey::Subscribe(topic, node), basis);
     }
 
     /// The names of all known nodes and loggers.
@@ -521,13 +492,10 @@ pub(crate) fn offers(of_streams: &ById<usize, u32>, streams: &[Stream]) -> ById<
 // Observations taken literally, with their times: signs, and ends by observations that revoke them.
 
 impl Conclusions<'_> {
-    /// All observations of one source with their signs and ends, sorted.
-    pub(crate) fn observations(
-        &mut self,
-        source: SourceId,
-    ) -> Vec<(ObservationRecord, Vec<Stamp>, Vec<Stamp>)> {
+    /// All observations of the source that concludes now, with their signs and ends, sorted.
+    pub(crate) fn observations(&mut self) -> Vec<(ObservationRecord, Vec<Stamp>, Vec<Stamp>)> {
         let endings = self.endings();
-        let facts = self.observed(source).into_iter();
+        let facts = self.observed(self.source).into_iter();
         let times = |fact: ObservationRecord| {
             let (signs, ends) = self.signs_and_ends(&fact, &endings);
             (fact, signs, ends)
@@ -579,7 +547,8 @@ impl Conclusions<'_> {
                 Observation::Refused(..) => Validity::Moments(signs),
                 _ => Validity::Signs { signs, ends },
             };
-            self.add(Inference::new(fact.source, what, fact.confidence, when));
+            self.source = fact.source;
+            self.add(what, fact.confidence, when);
         }
     }
 
@@ -815,14 +784,9 @@ pub(crate) struct Incident {
 
 impl Conclusions<'_> {
     /// Adds an incident; one shortly after another of its kind about the same element is merged with it.
-    pub(crate) fn incident(
-        &mut self,
-        source: SourceId,
-        what: ElementKey,
-        kind: IncidentKind,
-        time: Stamp,
-    ) {
-        let own = |old: &&mut Incident| old.what == what && (old.source == source);
+    pub(crate) fn incident(&mut self, what: ElementKey, kind: IncidentKind, time: Stamp) {
+        let source = self.source;
+        let own = |old: &&mut Incident| old.what == what && old.source == source;
         if let Some(last) = self.incidents.iter_mut().rev().find(own)
             && time.since(last.until.unwrap_or(last.time)) <= CLOSE_NS
         {

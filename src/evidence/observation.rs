@@ -298,15 +298,26 @@ impl Observations {
         if self.is_watched(said.observation.names()) && self.pieces.len() < budget::EVIDENCE_LINES {
             let text: String = words().chars().take(budget::EVIDENCE_LINE).collect();
             if !text.is_empty() {
-                self.pieces.push(EvidenceLine {
-                    time,
-                    source: source_word(source),
-                    confidence: said.confidence,
-                    text,
-                });
+                self.explain(source, said.confidence, time, text);
             }
         }
         self.add(source, said, time);
+    }
+
+    /// Adds a piece of evidence, by `source`.
+    pub(crate) fn explain(
+        &mut self,
+        source: SourceId,
+        confidence: Confidence,
+        time: Option<Stamp>,
+        text: String,
+    ) {
+        self.pieces.push(EvidenceLine {
+            time,
+            source: source_word(source),
+            confidence,
+            text,
+        });
     }
 
     /// Whether `why` requests an element with these names, or with this role.

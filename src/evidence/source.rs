@@ -49,7 +49,7 @@ pub struct Source {
 }
 
 /// A function that draws a conclusion.
-pub(crate) type Conclude = fn(SourceId, &mut Conclusions<'_>);
+pub(crate) type Conclude = fn(&mut Conclusions<'_>);
 
 /// An empty source, for rows to fill in.
 pub(crate) const NOTHING: Source = Source {

@@ -340,8 +340,10 @@ fn draw(
         return false;
     }
     let when = Validity::Like(ElementKey::Node(node));
-    let inference = Inference::new(source_id("source"), what, Confidence::Declared, when);
-    known.because(inference, None, |_| sentence(found, words));
+    known.source = source_id("source");
+    known.because(what, Confidence::Declared, when, None, |_| {
+        sentence(found, words)
+    });
     true
 }
 
@@ -658,9 +660,9 @@ fn draw_only(code: &Code, known: &mut Conclusions<'_>, candidate: &Candidate<'_>
         words(known, candidate)
     );
     let basis = Validity::Like(ElementKey::Topic(candidate.found.topic));
+    known.source = source_id("source_only");
     for (what, when) in [(ElementKey::Node(node), Validity::Whole), (edge, basis)] {
-        let inference = Inference::new(source_id("source_only"), what, Confidence::Declared, when);
-        known.because(inference, None, |_| text.clone());
+        known.because(what, Confidence::Declared, when, None, |_| text.clone());
     }
 }
 

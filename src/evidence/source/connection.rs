@@ -5,17 +5,16 @@ use serde_json::Value;
 
 use crate::base::name::is_log;
 use crate::base::yaml;
-use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
-use crate::evidence::observation::{Confidence, Observation, SourceId};
+use crate::evidence::inference::{Conclusions, ElementKey, Reliability, Validity};
+use crate::evidence::observation::{Confidence, Observation};
 use crate::evidence::source::SourceContext;
 
 /// Every stream is evidence for its topic, and for its publisher if that name is reliable.
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
     let streams = known.streams;
     for (at, stream) in streams.iter().enumerate() {
-        let inference = |what, when| Inference::new(source, what, Confidence::Measured, when);
         let topic = ElementKey::Topic(stream.topic);
-        known.add(inference(topic, Validity::Messages(at)));
+        known.add(topic, Confidence::Measured, Validity::Messages(at));
         let Some(node) = stream.publisher else {
             continue;
         };
@@ -25,16 +24,14 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
                 if known.named_by_others(stream.topic, node)
                     && !is_log(stream.connection.topic.as_str()) => {}
             Reliability::Whole | Reliability::Player => {
-                known.add(inference(edge, Validity::Messages(at)));
+                known.add(edge, Confidence::Measured, Validity::Messages(at));
             }
             Reliability::Likely => {
-                let when = Validity::Messages(at);
-                known.add(Inference::new(source, edge, Confidence::Inferred, when));
+                known.add(edge, Confidence::Inferred, Validity::Messages(at));
             }
             // The tool that wrote this header does not know the publishers of the other messages.
             Reliability::First => {
-                let when = Validity::First(at);
-                known.add(Inference::new(source, edge, Confidence::Stated, when));
+                known.add(edge, Confidence::Stated, Validity::First(at));
             }
             Reliability::Gone => {}
         }
@@ -91,12 +88,11 @@ pub(crate) fn announced(context: &mut SourceContext<'_>) {
 }
 
 /// Declares every topic with an offer, even without messages.
-pub(crate) fn conclude_offers(source: SourceId, known: &mut Conclusions<'_>) {
-    for fact in known.observed(source) {
+pub(crate) fn conclude_offers(known: &mut Conclusions<'_>) {
+    for fact in known.observed(known.source) {
         if let Observation::Quality(topic, _) = fact.observation {
             let what = ElementKey::Topic(topic);
-            let when = Validity::Whole;
-            known.add(Inference::new(source, what, Confidence::Declared, when));
+            known.add(what, Confidence::Declared, Validity::Whole);
         }
     }
 }

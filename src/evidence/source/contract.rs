@@ -15,7 +15,7 @@ use crate::base::ids::Few;
 use crate::base::name::{last_part, resolved};
 use crate::evidence::inference::{Conclusions, ElementKey, verb};
 use crate::evidence::message::dynamic::LogRecord;
-use crate::evidence::observation::{Name, Observation, SourceId};
+use crate::evidence::observation::{Name, Observation};
 
 const TABLE: &str = include_str!("contracts.csv");
 
@@ -103,7 +103,7 @@ fn contract(line: usize, row: &[String]) -> Option<Contract> {
     })
 }
 
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
     let files = files(known);
     let nodes = known.nodes().clone();
     let mut publishers: Few<Name, Vec<(Name, Contract)>> = Few::default();
@@ -122,19 +122,19 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
                 publishers.grown(topic).push((node, contract.clone()));
             } else if !known.knows(ElementKey::Publish(node, topic)) {
                 let what = ElementKey::Subscribe(topic, node);
-                known.infer(source, what, ElementKey::Node(node), |known| {
+                known.infer(what, ElementKey::Node(node), |known| {
                     words(known, node, &contract)
                 });
             }
         }
     }
     for (topic, nodes) in publishers.with_ids() {
-        publish(source, known, topic, nodes);
+        publish(known, topic, nodes);
     }
 }
 
 /// Adds the publishers of a topic, unless there would be more than the bag counts.
-fn publish(source: SourceId, known: &mut Conclusions<'_>, topic: Name, nodes: &[(Name, Contract)]) {
+fn publish(known: &mut Conclusions<'_>, topic: Name, nodes: &[(Name, Contract)]) {
     let all: BTreeSet<Name> = known
         .publishers(topic)
         .chain(nodes.iter().map(|n| n.0))
@@ -143,7 +143,7 @@ fn publish(source: SourceId, known: &mut Conclusions<'_>, topic: Name, nodes: &[
         return;
     }
     for (node, contract) in nodes {
-        known.infer_publisher(source, *node, topic, |known| words(known, *node, contract));
+        known.infer_publisher(*node, topic, |known| words(known, *node, contract));
     }
 }
 

@@ -6,16 +6,17 @@ use std::sync::Arc;
 
 use crate::base::ids::Few;
 use crate::base::name::{is_log, start};
-use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
-use crate::evidence::observation::{Confidence, Name, SourceId};
+use crate::evidence::inference::{Conclusions, ElementKey, Validity};
+use crate::evidence::observation::{Confidence, Name};
 use crate::evidence::source::SHARED;
 
 // Bonds: a node that publishes a bond topic (`bond/Status`) also subscribes to it.
 
-pub(crate) fn bond(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn bond(known: &mut Conclusions<'_>) {
     for topic in known.topics_of(|kind| kind == "bond/Status") {
         for node in known.publishers(topic).collect::<Vec<_>>() {
-            known.subscribes_as_well(source, node, topic, topic);
+            let basis = ElementKey::Publish(node, topic);
+            known.like(ElementKey::Subscribe(topic, node), basis);
         }
     }
 }
@@ -24,7 +25,7 @@ pub(crate) fn bond(source: SourceId, known: &mut Conclusions<'_>) {
 
 const PAIR: [&str; 2] = ["tf", "tf_static"];
 
-pub(crate) fn tf_pair(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn tf_pair(known: &mut Conclusions<'_>) {
     let listened: Vec<(Name, Name)> = known.subscriptions().collect();
     for (topic, node) in listened {
         let text = known.text(topic);
@@ -37,7 +38,7 @@ pub(crate) fn tf_pair(source: SourceId, known: &mut Conclusions<'_>) {
         let twin = known.facts.known(&format!("{space}/{}", PAIR[1 - at]));
         if let Some(twin) = twin.filter(|t| known.kind(*t) == "tf2_msgs/TFMessage") {
             let basis = ElementKey::Subscribe(topic, node);
-            known.infer(source, ElementKey::Subscribe(twin, node), basis, |known| {
+            known.infer(ElementKey::Subscribe(twin, node), basis, |known| {
                 format!(
                     "{} subscribes to {text}, and tf2 always subscribes to both",
                     known.text(node)
@@ -54,7 +55,7 @@ pub(crate) fn tf_pair(source: SourceId, known: &mut Conclusions<'_>) {
 /// not set, or the number is not a time. With less, nodes of a robot that is never shut down would lose their start.
 const LONGEST_NS: i64 = 30 * 86_400_000_000_000;
 
-pub(crate) fn anonymous(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn anonymous(known: &mut Conclusions<'_>) {
     let (first, last) = known.mission;
     for node in known.nodes().clone() {
         let Some(start) = start(&known.text(node)) else {
@@ -65,8 +66,7 @@ pub(crate) fn anonymous(source: SourceId, known: &mut Conclusions<'_>) {
         }
         let what = ElementKey::Node(node);
         let when = Validity::begin(start.max(first));
-        let inference = Inference::new(source, what, Confidence::Stated, when);
-        known.because(inference, Some(start), |known| {
+        known.because(what, Confidence::Stated, when, Some(start), |known| {
             format!("the name {} contains this start time", known.text(node))
         });
     }
@@ -75,15 +75,14 @@ pub(crate) fn anonymous(source: SourceId, known: &mut Conclusions<'_>) {
 // The publisher of a topic with messages that name none: if only one node is known to publish it, the messages are from
 // that node. For example, if only `/gps` is known to publish `/fix` from its log, it sent all messages of `/fix`.
 
-pub(crate) fn only_publisher(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn only_publisher(known: &mut Conclusions<'_>) {
     for (at, stream) in known.streams.iter().enumerate() {
         if stream.publisher.is_some() || SHARED.contains(&stream.connection.topic.as_str()) {
             continue;
         }
         if let Some(only) = known.only_publisher(stream.topic) {
             let what = ElementKey::Publish(only, stream.topic);
-            let when = Validity::Messages(at);
-            known.add(Inference::new(source, what, Confidence::Inferred, when));
+            known.add(what, Confidence::Inferred, Validity::Messages(at));
         }
     }
 }
@@ -93,7 +92,7 @@ pub(crate) fn only_publisher(source: SourceId, known: &mut Conclusions<'_>) {
 
 const TOPICS: [&str; 2] = ["/parameter_descriptions", "/parameter_updates"];
 
-pub(crate) fn dynamic_reconfigure(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn dynamic_reconfigure(known: &mut Conclusions<'_>) {
     let is_config = |kind: &str| {
         matches!(
             kind,
@@ -110,16 +109,19 @@ pub(crate) fn dynamic_reconfigure(source: SourceId, known: &mut Conclusions<'_>)
         for caller in &callers {
             for other in pair.iter().filter(|t| **t != topic) {
                 let basis = ElementKey::Publish(*caller, topic);
-                known.like(source, ElementKey::Publish(*caller, *other), basis);
+                known.like(ElementKey::Publish(*caller, *other), basis);
             }
             if is_nodelet(&known.text(*caller), node) {
                 let node = known.facts.name(node);
-                known.like(source, ElementKey::Node(node), ElementKey::Node(*caller));
+                known.like(ElementKey::Node(node), ElementKey::Node(*caller));
             }
         }
         if callers.is_empty() {
             let node = known.facts.name(node);
-            own_config(source, known, node, topic);
+            let what = ElementKey::Publish(node, topic);
+            for (at, _) in (0..).zip(known.streams).filter(|(_, s)| s.topic == topic) {
+                known.add(what, Confidence::Inferred, Validity::Messages(at));
+            }
         }
     }
 }
@@ -127,17 +129,6 @@ pub(crate) fn dynamic_reconfigure(source: SourceId, known: &mut Conclusions<'_>)
 /// Whether a topic of `node` that `caller` publishes shows a nodelet, not a part of the caller.
 fn is_nodelet(caller: &str, node: &str) -> bool {
     caller != node && !node.starts_with(&format!("{caller}/"))
-}
-
-/// Adds the publication of a node whose topic has no known publisher.
-fn own_config(source: SourceId, known: &mut Conclusions<'_>, node: Name, topic: Name) {
-    for (at, stream) in known.streams.iter().enumerate() {
-        if stream.topic == topic {
-            let what = ElementKey::Publish(node, topic);
-            let when = Validity::Messages(at);
-            known.add(Inference::new(source, what, Confidence::Inferred, when));
-        }
-    }
 }
 
 // Private names: a topic below a node's own full name, or of that name, belongs to the node, so it publishes it if no other
@@ -148,7 +139,7 @@ const TAKEN: &str = "\
     goal cancel cmd command set input target desired reference request trigger enable disable reset \
     joint_trajectory sub_";
 
-pub(crate) fn private_name(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn private_name(known: &mut Conclusions<'_>) {
     let nodes: NodesByName = known.nodes().iter().map(|n| (known.text(*n), *n)).collect();
     let spaces = spaces(&nodes);
     for topic in known.topics_of(|_| true) {
@@ -162,7 +153,7 @@ pub(crate) fn private_name(source: SourceId, known: &mut Conclusions<'_>) {
             continue;
         }
         if let Some(node) = owner(&name, &nodes, &spaces) {
-            known.infer_publisher(source, node, topic, |known| {
+            known.infer_publisher(node, topic, |known| {
                 let [topic, node] = [topic, node].map(|name| known.text(name));
                 format!("{topic} is in the private namespace of {node}")
             });
@@ -209,7 +200,7 @@ struct Twin {
     own: BTreeSet<String>,
 }
 
-pub(crate) fn sister(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn sister(known: &mut Conclusions<'_>) {
     for twins in families(known)
         .into_values()
         .filter(|twins| twins.len() <= MOST)
@@ -219,7 +210,7 @@ pub(crate) fn sister(source: SourceId, known: &mut Conclusions<'_>) {
                 .iter()
                 .filter(|other| other.node != one.node && other.own == one.own);
             for other in alike {
-                copy(source, known, one, other);
+                copy(known, one, other);
             }
         }
     }
@@ -263,7 +254,7 @@ fn inside(topic: &str, space: &str) -> Option<String> {
 }
 
 /// Adds for `to` the subscriptions of `from`, if the bag has the topics.
-fn copy(source: SourceId, known: &mut Conclusions<'_>, from: &Twin, to: &Twin) {
+fn copy(known: &mut Conclusions<'_>, from: &Twin, to: &Twin) {
     let subscribed = known.subscriptions().filter(|(_, node)| *node == from.node);
     let topics: Vec<Name> = subscribed.map(|(topic, _)| topic).collect();
     for topic in topics {
@@ -274,7 +265,7 @@ fn copy(source: SourceId, known: &mut Conclusions<'_>, from: &Twin, to: &Twin) {
         let own = |twin| known.knows(ElementKey::Publish(to.node, twin));
         if let Some(twin) = twin.filter(|t| known.is_recorded(*t) && !own(*t)) {
             let what = ElementKey::Subscribe(twin, to.node);
-            known.infer(source, what, ElementKey::Node(to.node), |known| {
+            known.infer(what, ElementKey::Node(to.node), |known| {
                 format!(
                     "{} publishes the same topics in its namespace and subscribes to {}",
                     known.text(from.node),

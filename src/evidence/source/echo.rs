@@ -9,10 +9,10 @@ use super::SourceContext;
 use crate::base::ids::{Few, grouped};
 use crate::base::name::{in_space, is_log, plain_type};
 use crate::base::time::Stamp;
-use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
+use crate::evidence::inference::{Conclusions, ElementKey, Validity};
 use crate::evidence::message::cursor::PayloadCursor;
 use crate::evidence::message::dynamic::{LogRecord, MessageSchema, MessageValue};
-use crate::evidence::observation::{Confidence, LoggedText, Name, ShownValue, SourceId};
+use crate::evidence::observation::{Confidence, LoggedText, Name, ShownValue};
 
 /// The fewest different values that are significant: two may agree by chance, and numbers are more often equal than words. With
 /// fewer, a text `state: 3` beside a counter would be an echo of it; with more, short recordings of a talker would show none.
@@ -125,7 +125,7 @@ struct Echo {
 /// A node, the text before and after the value, a topic.
 type LogForm = (Name, String, String, Name);
 
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
     let (said, shown) = known.facts.logged.sorted();
     let echoes = echoes(known, &said, &shown);
     let mut by_node: Few<Name, Vec<&str>> = Few::default();
@@ -153,7 +153,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             continue;
         }
         if let Some(what) = end(known, *node, *topic, before, after, echo) {
-            observe(source, known, what, (before, after), echo);
+            observe(known, what, (before, after), echo);
         }
     }
 }
@@ -275,7 +275,6 @@ fn end(
 }
 
 fn observe(
-    source: SourceId,
     known: &mut Conclusions<'_>,
     what: ElementKey,
     (before, after): (&str, &str),
@@ -288,9 +287,8 @@ fn observe(
         signs: echo.texts.iter().map(|(time, _)| *time).collect(),
         ends: Vec::new(),
     };
-    let inference = Inference::new(source, what, Confidence::Stated, when);
     let first = echo.texts.first().map(|(time, _)| *time);
-    known.because(inference, first, |_| {
+    known.because(what, Confidence::Stated, when, first, |_| {
         let (texts, values) = (echo.texts.len(), echo.values.len());
         format!("{texts} log texts `{before}…{after}` repeat {values} different messages")
     });
@@ -307,7 +305,7 @@ const BESIDE_NS: i64 = 50_000_000;
 const FEWEST_BESIDE: usize = 10;
 const SHARES_BESIDE: [usize; 2] = [90, 80];
 
-pub(crate) fn conclude_beside(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude_beside(known: &mut Conclusions<'_>) {
     let (said, _) = known.facts.logged.sorted();
     let of = |text: &LoggedText| Some(((known.owner(&text.logger)?, form(&text.text)), text.time));
     let mut forms = grouped(said.iter().filter_map(of));
@@ -336,7 +334,7 @@ pub(crate) fn conclude_beside(source: SourceId, known: &mut Conclusions<'_>) {
             continue;
         };
         if is_first && known.publishers(topic).next().is_none() {
-            known.infer_publisher(source, *node, topic, |known| {
+            known.infer_publisher(*node, topic, |known| {
                 let [node, topic] = [*node, topic].map(|name| known.text(name));
                 format!(
                     "{} log texts of {node} come with messages of {topic}",

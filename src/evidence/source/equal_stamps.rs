@@ -15,7 +15,7 @@ use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::message::cursor::PayloadCursor;
 use crate::evidence::message::dynamic::MessageSchema;
-use crate::evidence::observation::{Name, Observation, ObservationRecord, SourceId};
+use crate::evidence::observation::{Name, Observation, ObservationRecord};
 use crate::evidence::source_id;
 use crate::evidence::spread::Spread;
 use crate::evidence::times::Timed;
@@ -140,7 +140,7 @@ struct Flows {
     pairs: BTreeMap<(usize, usize), StampPair>,
 }
 
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
     if is_simulated(known) {
         return;
     }
@@ -159,7 +159,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         let (topic, matches) = input;
         for node in &flow.nodes {
             let basis = ElementKey::Publish(*node, flow.topic);
-            known.infer(source, ElementKey::Subscribe(topic, *node), basis, |known| {
+            known.infer(ElementKey::Subscribe(topic, *node), basis, |known| {
                 let [from, to] = [topic, flow.topic].map(|n| known.text(n));
                 let total = flow.messages;
                 format!(

@@ -17,7 +17,7 @@ use crate::base::name::LOGS;
 use crate::base::rhythm::FEWEST_OF_SENDER;
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
-use crate::evidence::observation::{Name, SourceId};
+use crate::evidence::observation::Name;
 use crate::evidence::source::SourceContext;
 use crate::evidence::spread::Spread;
 
@@ -85,7 +85,7 @@ struct Matches {
     runs: ById<usize, Vec<Run>>,
 }
 
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
     let (flows, matches) = matches(known);
     for (output, total) in matches.distinct.with_ids().filter(|(_, total)| **total > 0) {
         let (basis, sender) = flows[output];
@@ -99,11 +99,11 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         }
         known.copies.insert((node, basis));
         let inputs = nearest(&matches, output, &inputs);
-        switches(source, known, &flows, &matches, (output, &inputs));
+        switches(known, &flows, &matches, (output, &inputs));
         for input in inputs {
             let topic = flows[input].0;
             let what = ElementKey::Subscribe(topic, node);
-            known.infer(source, what, ElementKey::Publish(node, basis), |known| {
+            known.infer(what, ElementKey::Publish(node, basis), |known| {
                 let count = matches.pairs[&(input, output)].before;
                 let [from, to] = [topic, basis].map(|n| known.text(n));
                 format!(
@@ -116,7 +116,6 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
 
 /// Adds the times at which a mux switches to another of its inputs.
 fn switches(
-    source: SourceId,
     known: &mut Conclusions<'_>,
     flows: &[PayloadFlow],
     matches: &Matches,
@@ -132,7 +131,7 @@ fn switches(
     {
         let [from, to] = [pair[0], pair[1]].map(|run| flows[run.input].0);
         let what = ElementKey::Topic(flows[output].0);
-        known.incident(source, what, IncidentKind::Switch(from, to), pair[1].first);
+        known.incident(what, IncidentKind::Switch(from, to), pair[1].first);
     }
 }
 
@@ -309,7 +308,7 @@ fn nearest(matches: &Matches, output: usize, inputs: &[usize]) -> Vec<usize> {
 /// The name of the topic below that of the mux.
 const SELECTED: &str = "/selected";
 
-pub(crate) fn conclude_selected(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude_selected(known: &mut Conclusions<'_>) {
     let is_report = |topic: &Name| known.text(*topic).ends_with(SELECTED);
     let reports = known.topics_of(|kind| kind == "std_msgs/String");
     let reports: Vec<Name> = reports.into_iter().filter(is_report).collect();
@@ -330,7 +329,7 @@ pub(crate) fn conclude_selected(source: SourceId, known: &mut Conclusions<'_>) {
             of_report.filter_map(|value| Some((value.time, known.facts.known(&value.value)?)));
         let chosen: Vec<(Stamp, Name)> = chosen.collect();
         for output in outputs(known, node) {
-            select(source, known, (node, output), &chosen);
+            select(known, (node, output), &chosen);
         }
     }
 }
@@ -345,12 +344,7 @@ fn outputs(known: &Conclusions<'_>, node: Name) -> Vec<Name> {
 
 /// Adds the inputs of a mux that have the type of its output, and the times at which it switches from one to
 /// another.
-fn select(
-    source: SourceId,
-    known: &mut Conclusions<'_>,
-    (node, output): (Name, Name),
-    chosen: &[(Stamp, Name)],
-) {
+fn select(known: &mut Conclusions<'_>, (node, output): (Name, Name), chosen: &[(Stamp, Name)]) {
     let kind = known.kind(output);
     let is_input =
         |topic: Name| topic != output && known.is_recorded(topic) && known.kind(topic) == kind;
@@ -361,7 +355,7 @@ fn select(
         .collect();
     for (_, input) in &inputs {
         let what = ElementKey::Subscribe(*input, node);
-        known.infer(source, what, ElementKey::Publish(node, output), |known| {
+        known.infer(what, ElementKey::Publish(node, output), |known| {
             format!(
                 "{} reports that it forwards {}",
                 known.text(node),
@@ -375,7 +369,7 @@ fn select(
     }
     for pair in inputs.windows(2).filter(|pair| pair[0].1 != pair[1].1) {
         let switch = IncidentKind::Switch(pair[0].1, pair[1].1);
-        known.incident(source, what, switch, pair[1].0);
+        known.incident(what, switch, pair[1].0);
     }
 }
 

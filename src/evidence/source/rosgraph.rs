@@ -12,7 +12,7 @@ use crate::base::digest::hex_of;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind, verb};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::dynamic::{MessageLayout, MessageSchema, MessageValue};
-use crate::evidence::observation::{Name, Observation, SourceId};
+use crate::evidence::observation::{Name, Observation};
 
 /// `rosgraph_msgs/msg/Graph`.
 pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2("rosgraph_msgs/Graph", "");
@@ -303,8 +303,8 @@ fn incompatible(offered: &MessageValue, asked: &MessageValue) -> Option<&'static
 }
 
 /// Adds the subscribers that receive nothing, and duplicate names.
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
-    for fact in known.observed(source) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
+    for fact in known.observed(known.source) {
         let (what, kind) = match fact.observation {
             Observation::Starved(node, topic, policy) => (
                 ElementKey::Subscribe(topic, node),
@@ -315,7 +315,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         };
         // Each snapshot repeats it.
         if let Some(time) = known.times(&fact).first() {
-            known.incident(source, what, kind, *time);
+            known.incident(what, kind, *time);
         }
     }
 }

@@ -8,9 +8,9 @@ use std::sync::Arc;
 
 use crate::base::name::{LOGS, in_space, is_log, is_player, role, with_spaces};
 use crate::base::rhythm::FIRST_RECORD;
-use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
+use crate::evidence::inference::{Conclusions, ElementKey, Reliability, Validity};
 use crate::evidence::message::dynamic::LogRecord;
-use crate::evidence::observation::{Confidence, Name, Observation, Observations, SourceId};
+use crate::evidence::observation::{Confidence, Name, Observation, Observations};
 use crate::evidence::source::SourceContext;
 
 pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
@@ -84,9 +84,9 @@ fn list(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
 
 /// A topic in a rospy node's list that it is known to publish is a publication; one that others publish, or that nobody
 /// advertises, is a subscription.
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
     let unadvertised = unadvertised(known);
-    for (fact, signs, ends) in known.observations(source) {
+    for (fact, signs, ends) in known.observations() {
         let Observation::Lists(node, topic) = fact.observation else {
             continue;
         };
@@ -107,7 +107,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             Confidence::Inferred
         };
         let when = Validity::Signs { signs, ends };
-        known.add(Inference::new(source, what, confidence, when));
+        known.add(what, confidence, when);
     }
 }
 
@@ -212,8 +212,8 @@ pub(crate) fn read_ros2(context: &mut SourceContext<'_>, record: &LogRecord<'_>)
 }
 
 /// A logger is a part of the nearest node or logger above it, and a node if there is none; the node publishes the log.
-pub(crate) fn conclude_ros2(source: SourceId, known: &mut Conclusions<'_>) {
-    let observations = known.observations(source);
+pub(crate) fn conclude_ros2(known: &mut Conclusions<'_>) {
+    let observations = known.observations();
     let loggers = observations
         .iter()
         .filter_map(|(fact, signs, _)| match fact.observation {
@@ -237,7 +237,7 @@ pub(crate) fn conclude_ros2(source: SourceId, known: &mut Conclusions<'_>) {
         } else {
             Confidence::Stated
         };
-        known.add(Inference::new(source, what, confidence, when));
+        known.add(what, confidence, when);
     }
 }
 
@@ -272,18 +272,18 @@ fn owner<'a>(logger: &'a str, nodes: &BTreeSet<Arc<str>>) -> &'a str {
 // Every node of ROS 1 publishes `/rosout`, mostly silently; the node `/rosout` subscribes to it and publishes
 // `/rosout_agg`.
 
-pub(crate) fn conclude_rule(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude_rule(known: &mut Conclusions<'_>) {
     if !known.is_ros1() || known.nodes().is_empty() {
         return;
     }
     // Each recording in a namespace has its own master.
     for space in known.facts.spaces.clone() {
-        add_rule(source, known, &space);
+        add_rule(known, &space);
     }
 }
 
 /// Adds the log of the nodes whose recording lies in a namespace.
-fn add_rule(source: SourceId, known: &mut Conclusions<'_>, space: &str) {
+fn add_rule(known: &mut Conclusions<'_>, space: &str) {
     let own = |node: &str| {
         let spaces = known.facts.spaces.iter().map(String::as_str);
         let around = spaces.filter(|of| !of.is_empty() && in_space(of, node) == node);
@@ -292,16 +292,18 @@ fn add_rule(source: SourceId, known: &mut Conclusions<'_>, space: &str) {
     let nodes = known.nodes().iter().copied();
     let nodes: Vec<Name> = nodes.filter(|node| own(&known.text(*node))).collect();
     let [log, all] = LOGS.map(|name| known.facts.name(&in_space(space, name)));
-    let rule = |what, when| Inference::new(source, what, Confidence::Inferred, when);
-    for node in nodes {
-        if node != log {
-            let when = Validity::Like(ElementKey::Node(node));
-            known.add(rule(ElementKey::Publish(node, log), when));
-        }
+    for node in nodes.into_iter().filter(|node| *node != log) {
+        let when = Validity::Like(ElementKey::Node(node));
+        known.add(ElementKey::Publish(node, log), Confidence::Inferred, when);
     }
-    known.add(rule(ElementKey::Node(log), Validity::Always));
-    known.add(rule(ElementKey::Publish(log, all), Validity::Always));
-    known.add(rule(ElementKey::Subscribe(log, log), Validity::Always));
+    let own = [
+        ElementKey::Node(log),
+        ElementKey::Publish(log, all),
+        ElementKey::Subscribe(log, log),
+    ];
+    for what in own {
+        known.add(what, Confidence::Inferred, Validity::Always);
+    }
 }
 
 #[cfg(test)]
