@@ -18,7 +18,6 @@ use crate::evidence::inference::{
     Conclusions, ElementKey, Incident, IncidentKind, Inference, Stream, Validity, offers,
 };
 use crate::evidence::observation::{LoggedText, Measurement, Name, Observation, Observations};
-use crate::evidence::source::contract::Owners;
 use crate::evidence::times::Stamps;
 use crate::evidence::{Confidence, EvidenceLine, SOURCES, source_id, source_word, unknown};
 
@@ -115,13 +114,10 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
             (*from, *before) = (to(*from), to(*before));
         }
     }
-    let renamed = |stream: &Stream| {
-        let publisher = stream.publisher.map(to);
-        Stream {
-            topic: to(stream.topic),
-            publisher,
-            ..stream.clone()
-        }
+    let renamed = |stream: &Stream| Stream {
+        topic: to(stream.topic),
+        publisher: stream.publisher.map(to),
+        ..stream.clone()
     };
     let streams: Vec<Stream> = recorded.streams.iter().map(renamed).collect();
     let mut lines = std::mem::take(&mut facts.pieces);
@@ -194,9 +190,7 @@ fn declared(
     notices: &mut Notices,
 ) -> Vec<String> {
     let Some(code) = code else { return Vec::new() };
-    let owners = Owners::new(known);
-    let owner = |kind: &str, topic: &str| owners.node(kind, topic);
-    let found = matching::conclude(code, known, &owner);
+    let found = matching::conclude(code, known);
     notices.extend(found.notices);
     found.undrawn
 }
@@ -239,9 +233,8 @@ fn unmatched(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> 
         }
     }
     let notice = |((what, name), (place, near)): ((&str, &String), (&String, Option<&str>))| {
-        let near = near.map_or_else(String::new, |near| {
-            format!("; the nearest name is `{near}`")
-        });
+        let near = near.map(|near| format!("; the nearest name is `{near}`"));
+        let near = near.unwrap_or_default();
         let text = format!("{place}: the bag has no {what} `{name}`{near}");
         Notice::new(NoticeKind::Note, text)
     };
@@ -275,9 +268,8 @@ fn explained(
     inference: &Inference,
 ) -> Option<(Option<Stamp>, String)> {
     let what = sentence(known, inference.what);
-    let about = SOURCES
-        .get(inference.source)
-        .map_or("", |source| source.about);
+    let about = SOURCES.get(inference.source);
+    let about = about.map_or("", |source| source.about);
     let first = |at: usize| messages.bounds(known.streams[at].times).map(|(t, _)| t);
     match &inference.when {
         Validity::Messages(at) => {
@@ -329,10 +321,8 @@ fn stated(
         None => known.facts.name(text),
         Some((stem, _)) => {
             let nodes = known.nodes().iter().copied();
-            let run = nodes
-                .filter(|node| is_run_of(&known.text(*node), stem))
-                .min();
-            run.unwrap_or_else(|| known.facts.name(stem))
+            let runs = nodes.filter(|node| is_run_of(&known.text(*node), stem));
+            runs.min().unwrap_or_else(|| known.facts.name(stem))
         }
     };
     let what = match &entry.element {
@@ -376,9 +366,8 @@ fn stated(
 /// Whether a node has the anonymous name that a launch file makes of `stem`: with a host, a process and a number.
 fn is_run_of(node: &str, stem: &str) -> bool {
     let is_number = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
-    let suffix = node
-        .strip_prefix(stem)
-        .and_then(|rest| rest.strip_prefix('_'));
+    let rest = node.strip_prefix(stem).unwrap_or_default();
+    let suffix = rest.strip_prefix('_');
     let mut parts = suffix.unwrap_or_default().rsplit('_');
     parts.next().is_some_and(is_number) && parts.next().is_some_and(is_number)
 }
@@ -472,9 +461,8 @@ impl StatedValues {
     pub(crate) fn lifecycle(&self, node: Name, window: Span) -> Option<Arc<str>> {
         let states = self.states.of(node);
         let next = states.partition_point(|(time, _)| *time < window.end);
-        states
-            .get(next.checked_sub(1)?)
-            .map(|(_, state)| Arc::clone(state))
+        let (_, state) = states.get(next.checked_sub(1)?)?;
+        Some(Arc::clone(state))
     }
 
     /// The transitions of a node with their times, in order.
