@@ -375,6 +375,13 @@ impl<'a> Conclusions<'a> {
         said
     }
 
+    /// Whether headers name all publishers of a topic.
+    pub(crate) fn is_reported(&self, topic: Name) -> bool {
+        let mut streams = self.recorded.of(topic).iter().map(|at| &self.streams[*at]);
+        let is_sure = |of: &Stream| of.publisher.is_some() && of.trust == Reliability::Whole;
+        self.is_recorded(topic) && streams.all(is_sure)
+    }
+
     /// Whether a node other than `node` names this topic as its own, as publisher or subscriber.
     pub(crate) fn named_by_others(&self, topic: Name, node: Name) -> bool {
         self.facts.list.iter().any(|fact| {
@@ -417,13 +424,9 @@ impl<'a> Conclusions<'a> {
 
     /// The recorded topics whose type, without `/msg`, `fits` accepts, in the order of their names.
     pub(crate) fn topics_of(&self, fits: impl Fn(&str) -> bool) -> Vec<Name> {
-        let fitting = self
-            .streams
-            .iter()
-            .filter(|s| fits(&plain_type(&s.connection.type_name)));
-        let mut topics: Vec<_> = fitting
-            .map(|s| (s.connection.topic.clone(), s.topic))
-            .collect();
+        let connections = self.streams.iter().map(|s| (&s.connection, s.topic));
+        let fitting = connections.filter(|(of, _)| fits(&plain_type(&of.type_name)));
+        let mut topics: Vec<_> = fitting.map(|(of, topic)| (&of.topic, topic)).collect();
         topics.sort();
         topics.dedup();
         topics.into_iter().map(|(_, topic)| topic).collect()
@@ -508,10 +511,9 @@ impl Conclusions<'_> {
     pub(crate) fn take_at_their_word(&mut self) {
         let endings = self.endings();
         let facts = self.facts.list.iter();
+        let many = |fact: &ObservationRecord| self.facts.times.count(fact.times);
         let records = facts.filter_map(|fact| match fact.observation {
-            Observation::Node(node) => {
-                Some(((fact.source, node), self.facts.times.count(fact.times)))
-            }
+            Observation::Node(node) => Some(((fact.source, node), many(fact))),
             _ => None,
         });
         let records: BTreeMap<(SourceId, Name), u64> = records.collect();
@@ -579,22 +581,18 @@ impl Conclusions<'_> {
     ) -> (Vec<Stamp>, Vec<Stamp>) {
         let mut signs = self.times(fact);
         let ending = match fact.observation {
-            Observation::Node(node) => Some(Observation::NodeGone(node)),
+            Observation::Node(node) => endings.get(&Observation::NodeGone(node)),
             Observation::Subscribe(node, topic)
             | Observation::Joins(node, topic)
             | Observation::SaysSubscribe(node, topic) => {
-                Some(Observation::Unsubscribe(node, topic))
+                endings.get(&Observation::Unsubscribe(node, topic))
             }
             _ => None,
         };
-        let mut ends = ending
-            .and_then(|e| endings.get(&e))
-            .cloned()
-            .unwrap_or_default();
-        let snapshots = fact
-            .snapshot
-            .and_then(|name| endings.get(&Observation::Snapshot(name)));
-        if let Some(taken) = snapshots {
+        let mut ends = ending.cloned().unwrap_or_default();
+        if let Some(name) = fact.snapshot
+            && let Some(taken) = endings.get(&Observation::Snapshot(name))
+        {
             let mut absent = absences(&signs, taken);
             if SOURCES.get(fact.source).is_some_and(|source| source.holds) {
                 hold(&mut signs, taken);
@@ -611,11 +609,8 @@ impl Conclusions<'_> {
 /// Extends snapshots that show an element to the last moments before the next ones.
 fn hold(times: &mut Vec<Stamp>, snapshots: &[Stamp]) {
     let next = |time: &Stamp| snapshots.get(snapshots.partition_point(|t| t <= time));
-    let last: Vec<Stamp> = times
-        .iter()
-        .filter_map(next)
-        .map(|next| next.plus(-1))
-        .collect();
+    let last = times.iter().filter_map(next).map(|next| next.plus(-1));
+    let last: Vec<Stamp> = last.collect();
     times.extend(last);
     times.sort_unstable();
     times.dedup();
@@ -666,21 +661,15 @@ impl Closed {
         let mut times: BTreeMap<Name, Span> = BTreeMap::new();
         for fact in &known.facts.list {
             let listed = fact.snapshot.is_some();
-            let word = source_word(fact.source);
-            if let (
-                Observation::Lists(node, _) | Observation::Publish(node, _),
-                Some((first, last)),
-                true,
-            ) = (
-                fact.observation,
-                known.facts.times.bounds(fact.times),
-                listed,
-            ) {
-                let span = times.entry(node).or_insert(Span::new(first, last));
-                span.start = span.start.min(first);
-                span.end = span.end.max(last);
+            if let Observation::Lists(node, _) | Observation::Publish(node, _) = fact.observation
+                && let Some((first, last)) = known.facts.times.bounds(fact.times)
+                && listed
+            {
+                let own = Span::new(first, last);
+                let span = times.entry(node).or_insert(own);
+                *span = span.hull(own);
             }
-            match (fact.observation, word) {
+            match (fact.observation, source_word(fact.source)) {
                 (Observation::Lists(node, topic), _)
                 | (
                     Observation::Publish(node, topic) | Observation::Subscribe(node, topic),
@@ -696,25 +685,19 @@ impl Closed {
         }
         let settled = times.iter().filter(|(_, span)| span.nanos() >= SETTLED_NS);
         closed.settled = settled.map(|(node, _)| *node).collect();
-        closed.fill(known);
-        closed
-    }
-
-    fn fill(&mut self, known: &Conclusions<'_>) {
         let mut unnamed = Vec::new();
         for stream in known.streams {
             match stream.publisher {
                 Some(node) if stream.trust == Reliability::Whole => {
-                    self.stated.grown(stream.topic).insert(node);
+                    closed.stated.grown(stream.topic).insert(node);
                 }
-                _ => {
-                    unnamed.push(stream.topic);
-                }
+                _ => unnamed.push(stream.topic),
             }
         }
         for topic in unnamed {
-            self.stated.grown(topic).clear();
+            closed.stated.grown(topic).clear();
         }
+        closed
     }
 
     /// Whether every message of a topic names its publisher, and this node is never named.

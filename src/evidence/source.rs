@@ -42,8 +42,6 @@ pub struct Source {
     pub(crate) own: bool,
     /// Whether each of its snapshots is valid until the next one: they are made whenever something changes.
     pub(crate) holds: bool,
-    /// Reads the announcement of a connection.
-    pub(crate) announced: Option<fn(&mut SourceContext<'_>)>,
     /// Conclusions from the whole mission; run in the order of the rows.
     pub(crate) conclude: &'static [Conclude],
 }
@@ -58,7 +56,6 @@ pub(crate) const NOTHING: Source = Source {
     reads: &[],
     own: false,
     holds: false,
-    announced: None,
     conclude: &[],
 };
 

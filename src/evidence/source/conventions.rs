@@ -23,26 +23,21 @@ pub(crate) fn bond(known: &mut Conclusions<'_>) {
 
 // A subscriber of `/tf` also subscribes to `/tf_static`, and vice versa: tf2 always subscribes to both.
 
-const PAIR: [&str; 2] = ["tf", "tf_static"];
-
 pub(crate) fn tf_pair(known: &mut Conclusions<'_>) {
     let listened: Vec<(Name, Name)> = known.subscriptions().collect();
     for (topic, node) in listened {
         let text = known.text(topic);
-        let Some((space, last)) = text.rsplit_once('/') else {
-            continue;
+        let twin = match text.rsplit_once('/') {
+            Some((space, "tf")) => format!("{space}/tf_static"),
+            Some((space, "tf_static")) => format!("{space}/tf"),
+            _ => continue,
         };
-        let Some(at) = PAIR.iter().position(|name| *name == last) else {
-            continue;
-        };
-        let twin = known.facts.known(&format!("{space}/{}", PAIR[1 - at]));
+        let twin = known.facts.known(&twin);
         if let Some(twin) = twin.filter(|t| known.kind(*t) == "tf2_msgs/TFMessage") {
             let basis = ElementKey::Subscribe(topic, node);
             known.infer(ElementKey::Subscribe(twin, node), basis, |known| {
-                format!(
-                    "{} subscribes to {text}, and tf2 always subscribes to both",
-                    known.text(node)
-                )
+                let node = known.text(node);
+                format!("{node} subscribes to {text}, and tf2 always subscribes to both")
             });
         }
     }
@@ -90,16 +85,14 @@ pub(crate) fn only_publisher(known: &mut Conclusions<'_>) {
 // `dynamic_reconfigure` of ROS 1: `<node>/parameter_descriptions` and `<node>/parameter_updates` belong to
 // one node. A caller of another name, unless the topic is below it, runs that node as a nodelet.
 
+const CONFIGS: [&str; 2] = [
+    "dynamic_reconfigure/ConfigDescription",
+    "dynamic_reconfigure/Config",
+];
 const TOPICS: [&str; 2] = ["/parameter_descriptions", "/parameter_updates"];
 
 pub(crate) fn dynamic_reconfigure(known: &mut Conclusions<'_>) {
-    let is_config = |kind: &str| {
-        matches!(
-            kind,
-            "dynamic_reconfigure/ConfigDescription" | "dynamic_reconfigure/Config"
-        )
-    };
-    for topic in known.topics_of(is_config) {
+    for topic in known.topics_of(|kind| CONFIGS.contains(&kind)) {
         let text = known.text(topic);
         let Some(node) = TOPICS.iter().find_map(|end| text.strip_suffix(end)) else {
             continue;
@@ -171,10 +164,8 @@ fn spaces(nodes: &NodesByName) -> BTreeSet<&str> {
 
 /// The namespaces of a name, the nearest first, without the root.
 fn above(name: &str) -> impl Iterator<Item = &str> {
-    let slashes = name.rmatch_indices('/');
-    slashes
-        .map(|(at, _)| &name[..at])
-        .filter(|space| !space.is_empty())
+    let spaces = name.rmatch_indices('/').map(|(at, _)| &name[..at]);
+    spaces.filter(|space| !space.is_empty())
 }
 
 /// The node of a topic's name, or with the longest name above it, unless that name is also a namespace of other nodes.
@@ -201,15 +192,11 @@ struct Twin {
 }
 
 pub(crate) fn sister(known: &mut Conclusions<'_>) {
-    for twins in families(known)
-        .into_values()
-        .filter(|twins| twins.len() <= MOST)
-    {
+    let families = families(known).into_values();
+    for twins in families.filter(|twins| twins.len() <= MOST) {
         for one in &twins {
-            let alike = twins
-                .iter()
-                .filter(|other| other.node != one.node && other.own == one.own);
-            for other in alike {
+            let is_alike = |other: &&Twin| other.node != one.node && other.own == one.own;
+            for other in twins.iter().filter(is_alike) {
                 copy(known, one, other);
             }
         }
@@ -229,10 +216,9 @@ fn families(known: &Conclusions<'_>) -> BTreeMap<String, Vec<Twin>> {
         else {
             continue;
         };
-        let own: BTreeSet<String> = topics
-            .iter()
-            .filter_map(|t| inside(&known.text(*t), space))
-            .collect();
+        let own = topics.iter();
+        let own = own.filter_map(|topic| inside(&known.text(*topic), space));
+        let own: BTreeSet<String> = own.collect();
         if own.len() >= FEWEST {
             families.entry(last.to_owned()).or_default().push(Twin {
                 node,

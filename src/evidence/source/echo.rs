@@ -60,30 +60,22 @@ pub(crate) fn keep(context: &mut SourceContext<'_>, schema: &MessageSchema, payl
     if let (Ok(value), Some(time)) = (value, context.time) {
         let mut values = Vec::new();
         collect(&value, &mut values);
+        let logged = &mut context.facts.logged;
         for (field, value) in values.iter().enumerate() {
-            context
-                .facts
-                .logged
-                .show(time, (context.place, field), value);
+            logged.show(time, (context.place, field), value);
         }
     }
 }
+
+/// Packages of ROS itself, whose messages nodes do not log.
+const OF_ROS: &str = "rosgraph_msgs rcl_interfaces tf2_msgs tf roslib bond";
 
 /// The schema for parsing the messages of a type, whose definition has this one; `None` for those without words or numbers of
 /// their own.
 pub(crate) fn schema(type_name: &str, defined: &Arc<MessageSchema>) -> Option<Arc<MessageSchema>> {
     let plain = plain_type(type_name);
-    if [
-        "rosgraph_msgs/",
-        "rcl_interfaces/",
-        "tf2_msgs/",
-        "tf/",
-        "roslib/",
-        "bond/",
-    ]
-    .iter()
-    .any(|package| plain.starts_with(package))
-    {
+    let (package, _) = plain.split_once('/').unwrap_or_default();
+    if OF_ROS.split(' ').any(|own| own == package) {
         return None;
     }
     let known = match &*plain {
@@ -134,15 +126,12 @@ pub(crate) fn conclude(known: &mut Conclusions<'_>) {
             by_node.grown(node).push(&text.text);
         }
     }
-    let enough = echoes
-        .iter()
-        .filter(|(_, echo)| echo.values.len() >= FEWEST);
-    let strong: Vec<_> = enough
-        .take(MOST_FORMS)
-        .filter(|((node, before, after, _), echo)| {
-            is_strong(echo, before, after, by_node.of(*node))
-        })
-        .collect();
+    let mut strong: Vec<_> = echoes.iter().collect();
+    strong.retain(|(_, echo)| echo.values.len() >= FEWEST);
+    strong.truncate(MOST_FORMS);
+    strong.retain(|((node, before, after, _), echo)| {
+        is_strong(echo, before, after, by_node.of(*node))
+    });
     for ((node, before, after, topic), echo) in &strong {
         let same = |other: &&(&LogForm, &Echo)| {
             let (n, b, a, _) = other.0;
@@ -152,8 +141,19 @@ pub(crate) fn conclude(known: &mut Conclusions<'_>) {
         if strong.iter().filter(same).count() > 1 {
             continue;
         }
-        if let Some(what) = end(known, *node, *topic, before, after, echo) {
-            observe(known, what, (before, after), echo);
+        if let Some(what) = end(known, *node, *topic, before, after, echo)
+            && !known.knows(what)
+            && !known.denies(what)
+        {
+            let when = Validity::Signs {
+                signs: echo.texts.iter().map(|(time, _)| *time).collect(),
+                ends: Vec::new(),
+            };
+            let first = echo.texts.first().map(|(time, _)| *time);
+            known.because(what, Confidence::Stated, when, first, |_| {
+                let (texts, values) = (echo.texts.len(), echo.values.len());
+                format!("{texts} log texts `{before}…{after}` repeat {values} different messages")
+            });
         }
     }
 }
@@ -230,10 +230,9 @@ fn is_strong(echo: &Echo, before: &str, after: &str, by_node: &[&str]) -> bool {
         return true;
     }
     let length = before.len() + after.len();
-    let form = by_node
-        .iter()
-        .filter(|text| text.len() >= length && text.starts_with(before) && text.ends_with(after));
-    echo.texts.len() * 100 >= form.count() * SHARE
+    let is_form =
+        |text: &&&str| text.len() >= length && text.starts_with(before) && text.ends_with(after);
+    echo.texts.len() * 100 >= by_node.iter().filter(is_form).count() * SHARE
 }
 
 /// Whether the words of a text mean a message sent (`true`) or received (`false`); `None` if neither or both.
@@ -255,11 +254,9 @@ fn end(
     echo: &Echo,
 ) -> Option<ElementKey> {
     let (all, first) = (echo.texts.len(), echo.first);
-    let (publish, subscribe) = (
-        ElementKey::Publish(node, topic),
-        ElementKey::Subscribe(topic, node),
-    );
-    if known.publishers(topic).any(|p| p == node) {
+    let publish = ElementKey::Publish(node, topic);
+    let subscribe = ElementKey::Subscribe(topic, node);
+    if known.knows(publish) {
         return None;
     }
     let later = first * 5 <= all;
@@ -272,26 +269,6 @@ fn end(
         Some(false) => later.then_some(subscribe),
         None => (first * 10 >= all * 9).then_some(publish),
     }
-}
-
-fn observe(
-    known: &mut Conclusions<'_>,
-    what: ElementKey,
-    (before, after): (&str, &str),
-    echo: &Echo,
-) {
-    if known.knows(what) || known.denies(what) {
-        return;
-    }
-    let when = Validity::Signs {
-        signs: echo.texts.iter().map(|(time, _)| *time).collect(),
-        ends: Vec::new(),
-    };
-    let first = echo.texts.first().map(|(time, _)| *time);
-    known.because(what, Confidence::Stated, when, first, |_| {
-        let (texts, values) = (echo.texts.len(), echo.values.len());
-        format!("{texts} log texts `{before}…{after}` repeat {values} different messages")
-    });
 }
 
 // Texts that come with messages. For example, `/walker` logs `speed: 0.2` 24 times, numbers aside, and each time a message of

@@ -11,7 +11,7 @@ use crate::base::time::Stamp;
 use crate::evidence::inference::{
     Conclusions, ElementKey, IncidentKind, Reliability, Stream, Validity, verb,
 };
-use crate::evidence::message::dynamic::{LogRecord, is_ros1_log};
+use crate::evidence::message::dynamic::{LogRecord, full_name, is_ros1_log};
 use crate::evidence::observation::{Confidence, Name, Observation, ObservationRecord};
 use crate::evidence::source::{SHARED, SourceContext};
 use crate::evidence::source_id;
@@ -170,14 +170,9 @@ fn doubled(record: &LogRecord<'_>) -> Option<String> {
     }
     let rest = text.split_once("Publisher already registered for ")?.1;
     // Since Iron the text names the logger; the record's own is `rcl.logging_rosout`, or the node's.
-    let named = rest
-        .strip_prefix("node name: '")
-        .and_then(|rest| rest.split_once('\''));
-    match named {
-        Some((name, _)) => Some(format!(
-            "/{}",
-            name.trim_start_matches('/').replace('.', "/")
-        )),
+    let named = rest.strip_prefix("node name: '");
+    match named.and_then(|rest| rest.split_once('\'')) {
+        Some((name, _)) => Some(full_name(name)),
         None => Some(record.logger.clone()).filter(|name| !name.starts_with("/rcl/")),
     }
 }
@@ -203,13 +198,11 @@ pub(crate) fn conclude_duplicates(known: &mut Conclusions<'_>) {
 
 /// The topic that a recorder, of ROS 1 or ROS 2, says that it has found.
 fn found_topic(text: &str) -> Option<&str> {
-    let of_ros2 = || {
-        text.strip_prefix("Subscribed to topic '")?
-            .strip_suffix('\'')
-    };
-    text.strip_prefix("Subscribing to ")
-        .map(str::trim)
-        .or_else(of_ros2)
+    if let Some(topic) = text.strip_prefix("Subscribing to ") {
+        return Some(topic.trim());
+    }
+    let quoted = text.strip_prefix("Subscribed to topic '")?;
+    quoted.strip_suffix('\'')
 }
 
 /// The topics that recorders found, each with the times.
@@ -241,10 +234,8 @@ fn births(known: &mut Conclusions<'_>) -> Vec<(Name, Stamp)> {
     }
     // One that is given a list of topics names all of them when it starts, and need not find any.
     let births = found.iter().filter_map(|(_, times)| times.first());
-    let is_list = births
-        .clone()
-        .min()
-        .is_none_or(|first| !births.clone().any(|time| is_later(*first, &time)));
+    let first = births.clone().min();
+    let is_list = first.is_none_or(|first| !births.clone().any(|time| is_later(*first, &time)));
     let start = known.mission.0;
     let birth = |(topic, times): (Name, Vec<Stamp>)| {
         let birth = times.first().copied().filter(|_| !is_list)?;

@@ -125,10 +125,7 @@ fn switches(
     let runs: Vec<&Run> = runs
         .filter(|run| run.count >= FEWEST_OF_SENDER && inputs.contains(&run.input))
         .collect();
-    for pair in runs
-        .windows(2)
-        .filter(|pair| pair[0].input != pair[1].input)
-    {
+    for pair in runs.windows(2).filter(|two| two[0].input != two[1].input) {
         let [from, to] = [pair[0], pair[1]].map(|run| flows[run.input].0);
         let what = ElementKey::Topic(flows[output].0);
         known.incident(what, IncidentKind::Switch(from, to), pair[1].first);
@@ -150,18 +147,12 @@ fn matches(known: &mut Conclusions<'_>) -> (Vec<PayloadFlow>, Matches) {
     });
     let (places, series): (Vec<usize>, Vec<_>) = kept.unzip();
     let flow_of = |at: &usize| (known.streams[*at].topic, known.streams[*at].publisher);
-    let named: BTreeMap<_, PayloadFlow> = places
-        .iter()
-        .map(|at| {
-            (
-                (
-                    known.text(flow_of(at).0),
-                    flow_of(at).1.map(|n| known.text(n)),
-                ),
-                flow_of(at),
-            )
-        })
-        .collect();
+    let named = places.iter().map(|at| {
+        let (topic, node) = flow_of(at);
+        let names = (known.text(topic), node.map(|node| known.text(node)));
+        (names, (topic, node))
+    });
+    let named: BTreeMap<_, PayloadFlow> = named.collect();
     let flows: Vec<PayloadFlow> = named.into_values().collect();
     let rank: BTreeMap<PayloadFlow, usize> = flows.iter().copied().zip(0..).collect();
     let flow_at: Vec<usize> = places.iter().map(|at| rank[&flow_of(at)]).collect();
@@ -207,12 +198,10 @@ impl PayloadWalk {
         if owners.len() >= MOST_AT_ONCE {
             return;
         }
-        for (_, other) in owners.iter().filter(|(t, f)| *t < time && *f != flow) {
-            let later = self.found.later.grown(*other);
-            *later.entry(flow).or_default() += 1;
-        }
         let mut origins = Vec::new();
         for (before, input) in owners.iter().filter(|(t, f)| *t < time && *f != flow) {
+            let later = self.found.later.grown(*input);
+            *later.entry(flow).or_default() += 1;
             let pair = self.found.pairs.entry((*input, flow)).or_default();
             pair.before += 1;
             pair.lag.add(time.since(*before) as f64 / 1e9);
@@ -278,10 +267,9 @@ fn copied(matches: &Matches, output: usize, inputs: &[usize]) -> u64 {
     let before = origins.filter(|(from, _)| from.iter().any(|f| inputs.contains(f)));
     let later = matches.later.get(output).into_iter().flatten();
     let later = later.filter(|(input, _)| inputs.contains(input));
-    let all = before
-        .map(|(_, count)| count)
-        .chain(later.map(|(_, count)| count));
-    all.sum::<u64>().min(matches.distinct[output])
+    let before: u64 = before.map(|(_, count)| count).sum();
+    let later: u64 = later.map(|(_, count)| count).sum();
+    (before + later).min(matches.distinct[output])
 }
 
 /// The nearer of two inputs with the same messages, which are on one path: the one whose lag clearly varies
@@ -296,11 +284,8 @@ fn nearest(matches: &Matches, output: usize, inputs: &[usize]) -> Vec<usize> {
     let is_path = |a, b| together(a, b) * 2 >= pair(a).before.min(pair(b).before);
     let beats = |a: usize, b: usize| pair(a).lag.is_clearly_less(&pair(b).lag);
     let rivals = |a: usize| inputs.iter().copied().filter(move |b| *b != a);
-    inputs
-        .iter()
-        .copied()
-        .filter(|a| rivals(*a).all(|b| !is_path(*a, b) || beats(*a, b)))
-        .collect()
+    let is_nearest = |a: &usize| rivals(*a).all(|b| !is_path(*a, b) || beats(*a, b));
+    inputs.iter().copied().filter(is_nearest).collect()
 }
 
 // The choice that a mux reports on `<mux>/selected`: it subscribes to that topic and forwards it from then on.
@@ -324,22 +309,15 @@ pub(crate) fn conclude_selected(known: &mut Conclusions<'_>) {
         };
         let of_report = shown
             .iter()
-            .filter(|value| known.streams[value.stream].topic == report);
-        let chosen =
-            of_report.filter_map(|value| Some((value.time, known.facts.known(&value.value)?)));
+            .filter(|of| known.streams[of.stream].topic == report);
+        let chosen = of_report.filter_map(|of| Some((of.time, known.facts.known(&of.value)?)));
         let chosen: Vec<(Stamp, Name)> = chosen.collect();
-        for output in outputs(known, node) {
+        let is_output = |(of, topic): &(Name, Name)| *of == node && known.is_recorded(*topic);
+        let outputs: Vec<_> = known.publications().filter(is_output).collect();
+        for (_, output) in outputs {
             select(known, (node, output), &chosen);
         }
     }
-}
-
-/// The topics that a node publishes besides its reports and its log.
-fn outputs(known: &Conclusions<'_>, node: Name) -> Vec<Name> {
-    let own = known.publications().filter(|(of, _)| *of == node);
-    let topics = own.map(|(_, topic)| topic);
-    let is_recorded = |topic: &Name| known.is_recorded(*topic);
-    topics.filter(is_recorded).collect()
 }
 
 /// Adds the inputs of a mux that have the type of its output, and the times at which it switches from one to
@@ -348,19 +326,13 @@ fn select(known: &mut Conclusions<'_>, (node, output): (Name, Name), chosen: &[(
     let kind = known.kind(output);
     let is_input =
         |topic: Name| topic != output && known.is_recorded(topic) && known.kind(topic) == kind;
-    let inputs: Vec<(Stamp, Name)> = chosen
-        .iter()
-        .copied()
-        .filter(|(_, t)| is_input(*t))
-        .collect();
+    let mut inputs = chosen.to_vec();
+    inputs.retain(|(_, topic)| is_input(*topic));
     for (_, input) in &inputs {
         let what = ElementKey::Subscribe(*input, node);
         known.infer(what, ElementKey::Publish(node, output), |known| {
-            format!(
-                "{} reports that it forwards {}",
-                known.text(node),
-                known.text(*input)
-            )
+            let [node, input] = [node, *input].map(|name| known.text(name));
+            format!("{node} reports that it forwards {input}")
         });
     }
     let what = ElementKey::Topic(output);

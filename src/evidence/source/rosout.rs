@@ -101,7 +101,7 @@ pub(crate) fn conclude(known: &mut Conclusions<'_>) {
             (false, false) => continue,
         };
         // If headers do not name all publishers, a node that names a topic may be one of them.
-        let confidence = if is_reported(known, topic) {
+        let confidence = if known.is_reported(topic) {
             Confidence::Stated
         } else {
             Confidence::Inferred
@@ -121,27 +121,20 @@ fn is_of_all(known: &Conclusions<'_>, topic: Name) -> bool {
 /// The topics that every node of ROS 1 may publish.
 const OF_ALL: [&str; 2] = ["/rosout", "/statistics"];
 
-/// Whether headers name all publishers of a topic.
-fn is_reported(known: &Conclusions<'_>, topic: Name) -> bool {
-    let mut of_topic = known.streams.iter().filter(|s| s.topic == topic);
-    known.is_recorded(topic)
-        && of_topic.all(|s| s.publisher.is_some() && s.trust == Reliability::Whole)
-}
-
 /// Whether a node that differs only in an anonymous suffix publishes a topic whose headers do not name all publishers.
 fn has_twin(known: &Conclusions<'_>, node: Name, topic: Name) -> bool {
     let own = known.text(node);
     let base = role(&own);
     let mut publishers = known.publishers(topic);
     base.len() < own.len()
-        && !is_reported(known, topic)
+        && !known.is_reported(topic)
         && publishers.any(|p| role(&known.text(p)) == base)
 }
 
 /// Whether a node that names `/tf` as its own publishes it rather than subscribes to it: a tf2 listener also
 /// names `/tf_static`. Used only if headers do not name all publishers.
 fn is_broadcaster(known: &Conclusions<'_>, node: Name, topic: Name) -> bool {
-    let stated = is_reported(known, topic);
+    let stated = known.is_reported(topic);
     let text = known.text(topic);
     let twin = match text.strip_suffix("/tf_static") {
         Some(space) => format!("{space}/tf"),
@@ -150,10 +143,12 @@ fn is_broadcaster(known: &Conclusions<'_>, node: Name, topic: Name) -> bool {
     };
     let twin = known.facts.known(&twin);
     let names = |twin| {
-        let facts = known.facts.list.iter();
-        facts
-            .map(|f| f.observation)
-            .any(|c| c == Observation::Lists(node, twin))
+        let listed = Observation::Lists(node, twin);
+        known
+            .facts
+            .list
+            .iter()
+            .any(|fact| fact.observation == listed)
     };
     !stated && !twin.is_some_and(names)
 }

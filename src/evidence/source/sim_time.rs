@@ -80,17 +80,13 @@ pub(crate) fn read_parameters(context: &mut SourceContext<'_>, event: &Parameter
         return;
     };
     let (node, clock) = (context.name(event.node), context.name("/clock"));
-    let observation = if simulated {
-        Observation::Subscribe(node, clock)
+    let (observation, then) = if simulated {
+        (Observation::Subscribe(node, clock), "")
     } else {
-        Observation::Unsubscribe(node, clock)
+        let then = ", so it does not subscribe to /clock";
+        (Observation::Unsubscribe(node, clock), then)
     };
     context.observation(observation, Confidence::Inferred, || {
-        let then = if simulated {
-            ""
-        } else {
-            ", so it does not subscribe to /clock"
-        };
         format!("{} sets use_sim_time to {simulated}{then}", event.node)
     });
 }
