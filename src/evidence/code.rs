@@ -135,16 +135,12 @@ fn in_parallel(files: &[SourceFile]) -> Vec<FileRead> {
             }
         }
     };
-    let mut all: Vec<(usize, FileRead)> = std::thread::scope(|scope| {
-        let readers: Vec<_> = (0..READERS.min(files.len()))
-            .map(|_| scope.spawn(work))
-            .collect();
-        readers
-            .into_iter()
-            .flat_map(|reader| reader.join().unwrap_or_default())
-            .collect()
+    let all: Vec<(usize, FileRead)> = std::thread::scope(|scope| {
+        let readers = 0..READERS.min(files.len());
+        let readers: Vec<_> = readers.map(|_| scope.spawn(work)).collect();
+        let read = readers.into_iter().map(|reader| reader.join());
+        read.flat_map(Result::unwrap_or_default).collect()
     });
-    all.sort_by_key(|(at, _)| *at);
     // If a reader panics, its files are missing; the others keep their positions.
     let mut read: Vec<FileRead> = files.iter().map(|_| FileRead::default()).collect();
     for (at, file) in all {

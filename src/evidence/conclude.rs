@@ -18,7 +18,6 @@ use crate::evidence::inference::{
     Conclusions, ElementKey, Incident, IncidentKind, Inference, Stream, Validity, offers,
 };
 use crate::evidence::observation::{LoggedText, Measurement, Name, Observation, Observations};
-use crate::evidence::times::Stamps;
 use crate::evidence::{Confidence, EvidenceLine, SOURCES, source_id, source_word, unknown};
 
 #[cfg(feature = "source")]
@@ -168,7 +167,7 @@ fn concluded<'a>(
     }
     let unmatched = unmatched(&known, &options.topology.entries);
     for entry in &options.topology.entries {
-        stated(&mut known, entry, (start, end), &recorded.messages);
+        stated(&mut known, entry);
     }
     let mut notices = Notices::new();
     notices.extend(options.topology.notices.iter().cloned());
@@ -177,7 +176,7 @@ fn concluded<'a>(
     #[cfg(not(feature = "source"))]
     let undrawn = Vec::new();
     unknown::conclude(&mut known);
-    explain(&mut known, &recorded.messages);
+    explain(&mut known);
     notices.extend(unmatched);
     (known, notices, undrawn)
 }
@@ -242,14 +241,14 @@ fn unmatched(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> 
 }
 
 /// Explains inferences that are not based on a single message, for elements requested by `why`.
-fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
+fn explain(known: &mut Conclusions<'_>) {
     let is_asked = |inference: &&Inference| {
         known.facts.is_watched(inference.what.ends())
             && !known.worded.contains(&(inference.what, inference.source))
     };
     let asked = known.inferences.iter().filter(is_asked);
     let pieces = asked.filter_map(|inference| {
-        let (time, text) = explained(known, messages, inference)?;
+        let (time, text) = explained(known, inference)?;
         Some(EvidenceLine {
             time,
             source: source_word(inference.source),
@@ -262,18 +261,15 @@ fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
 }
 
 /// The time and text of an inference; `None` if it comes from observations with their own text.
-fn explained(
-    known: &Conclusions<'_>,
-    messages: &Stamps,
-    inference: &Inference,
-) -> Option<(Option<Stamp>, String)> {
+fn explained(known: &Conclusions<'_>, inference: &Inference) -> Option<(Option<Stamp>, String)> {
     let what = sentence(known, inference.what);
     let about = SOURCES.get(inference.source);
     let about = about.map_or("", |source| source.about);
-    let first = |at: usize| messages.bounds(known.streams[at].times).map(|(t, _)| t);
+    let first = |at: usize| known.bounds(&known.streams[at]).map(|(first, _)| first);
     match &inference.when {
         Validity::Messages(at) => {
-            let many = match messages.count(known.streams[*at].times) {
+            let times = known.streams[*at].times;
+            let many = match known.messages.map_or(0, |all| all.count(times)) {
                 0 => "no message".to_owned(),
                 1 => "1 message, here".to_owned(),
                 n => format!("{n} messages from here on"),
@@ -311,12 +307,8 @@ fn sentence(known: &Conclusions<'_>, what: ElementKey) -> String {
 }
 
 /// Adds an entry of the user's file.
-fn stated(
-    known: &mut Conclusions<'_>,
-    entry: &TopologyEntry,
-    mission: (Stamp, Stamp),
-    messages: &Stamps,
-) {
+fn stated(known: &mut Conclusions<'_>, entry: &TopologyEntry) {
+    let mission = known.mission;
     let mut name = |text: &String| match text.split_once(ANONYMOUS) {
         None => known.facts.name(text),
         Some((stem, _)) => {
@@ -356,7 +348,7 @@ fn stated(
     known.add(what, confidence, when);
     // The time of its launch is unknown: assume that it exists while others in its namespace do.
     if entry.declared
-        && let Some(neighbour) = neighbour(known, what, messages)
+        && let Some(neighbour) = neighbour(known, what)
     {
         let when = Validity::Like(ElementKey::Node(neighbour));
         known.add(what, confidence, when);
@@ -374,13 +366,13 @@ fn is_run_of(node: &str, stem: &str) -> bool {
 
 /// The node that publishes for the longest time in the namespace of a node, or of an edge's node; `None` at
 /// the root.
-fn neighbour(known: &Conclusions<'_>, what: ElementKey, messages: &Stamps) -> Option<Name> {
+fn neighbour(known: &Conclusions<'_>, what: ElementKey) -> Option<Name> {
     let node = what.ends()[0]?;
     let text = known.text(node);
     let space = namespace(&text);
     let streams = known.streams.iter().filter_map(|stream| {
         let of = stream.publisher.filter(|of| *of != node)?;
-        let (first, last) = messages.bounds(stream.times)?;
+        let (first, last) = known.bounds(stream)?;
         let is_near = !space.trim_matches('/').is_empty() && namespace(&known.text(of)) == space;
         is_near.then(|| (last.since(first), of))
     });

@@ -462,6 +462,11 @@ impl<'a> Conclusions<'a> {
         }
     }
 
+    /// The times of the first and the last message of a stream.
+    pub(crate) fn bounds(&self, stream: &Stream) -> Option<(Stamp, Stamp)> {
+        self.messages?.bounds(stream.times)
+    }
+
     /// The text of a name.
     pub(crate) fn text(&self, name: Name) -> Arc<str> {
         self.facts.text(name)

@@ -451,10 +451,8 @@ impl Observations {
             new[*old] = rank;
         }
         let to = |name: Name| new.get(name).copied().unwrap_or(name);
-        self.texts = order
-            .iter()
-            .map(|old| Arc::clone(&self.texts[*old]))
-            .collect();
+        let texts = order.iter().map(|old| Arc::clone(&self.texts[*old]));
+        self.texts = texts.collect();
         self.overflow = self.overflow.map(to);
         let names = (0..).map(Name);
         self.ids = self.texts.iter().cloned().zip(names).collect();

@@ -150,11 +150,8 @@ impl Call {
             below(role, suffix, types.collect())
         };
         let fixed = |role, suffix, name: &str| {
-            below(
-                role,
-                suffix,
-                types.clone().map(|_| name.to_owned()).collect(),
-            )
+            let types = types.clone().map(|_| name.to_owned());
+            below(role, suffix, types.collect())
         };
         let image = |role, suffix, name| below(role, suffix, vec![format!("sensor_msgs/{name}")]);
         let transform = |role, topic: &str| {

@@ -92,10 +92,8 @@ fn statements(tokens: &[DotToken]) -> Statements {
             at += 1;
         }
         let mut chain = vec![token.text.clone()];
-        while tokens
-            .get(at)
-            .is_some_and(|t| t.text == "->" || t.text == "--")
-        {
+        let is_line = |token: &DotToken| token.text == "->" || token.text == "--";
+        while tokens.get(at).is_some_and(is_line) {
             chain.extend(tokens.get(at + 1).map(|t| t.text.clone()));
             at += 2;
         }

@@ -204,10 +204,8 @@ fn place(text: &str, value: &str) -> Option<Range<usize>> {
     let start = text.find(value)?;
     let end = start + value.len();
     let is_part = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
-    let (before, after) = (
-        text[..start].chars().next_back(),
-        text[end..].chars().next(),
-    );
+    let before = text[..start].chars().next_back();
+    let after = text[end..].chars().next();
     let more = is_number(value)
         && (matches!(before, Some('.' | '-'))
             || text[end..].starts_with('.')

@@ -260,8 +260,8 @@ pub(crate) fn conclude_births(known: &mut Conclusions<'_>) {
         let publisher = |stream: &Stream| stream.publisher;
         let nodes: BTreeSet<Option<Name>> = streams.clone().map(publisher).collect();
         let is_there = |stream: &&Stream| {
-            let first = known.messages.and_then(|all| all.bounds(stream.times));
-            nodes.len() == 1 || first.is_some_and(|of| of.0.since(birth) <= FOUND_NS)
+            let bounds = known.bounds(stream);
+            nodes.len() == 1 || bounds.is_some_and(|(first, _)| first.since(birth) <= FOUND_NS)
         };
         let there: BTreeSet<_> = streams.filter(is_there).map(publisher).collect();
         for node in there {
@@ -316,7 +316,7 @@ pub(crate) fn conclude_connected(known: &mut Conclusions<'_>) {
 fn recordings(known: &mut Conclusions<'_>) -> Vec<(Stamp, bool)> {
     let found: BTreeMap<Name, Vec<Stamp>> = found(known).into_iter().collect();
     let first = |stream: &Stream| {
-        let (first, _) = known.messages?.bounds(stream.times)?;
+        let (first, _) = known.bounds(stream)?;
         Some((stream.bag, (first, stream.topic)))
     };
     let bags = grouped(known.streams.iter().filter_map(first));

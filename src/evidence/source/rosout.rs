@@ -208,13 +208,11 @@ pub(crate) fn read_ros2(context: &mut SourceContext<'_>, record: &LogRecord<'_>)
 
 /// A logger is a part of the nearest node or logger above it, and a node if there is none; the node publishes the log.
 pub(crate) fn conclude_ros2(known: &mut Conclusions<'_>) {
-    let observations = known.observations();
-    let loggers = observations
-        .iter()
-        .filter_map(|(fact, signs, _)| match fact.observation {
-            Observation::Logger(name, topic) => Some((known.text(name), topic, signs.clone())),
-            _ => None,
-        });
+    let observations = known.observations().into_iter();
+    let loggers = observations.filter_map(|(fact, signs, _)| match fact.observation {
+        Observation::Logger(name, topic) => Some((known.text(name), topic, signs)),
+        _ => None,
+    });
     let mut loggers: Vec<_> = loggers.collect();
     loggers.sort_by(|a, b| a.0.cmp(&b.0));
     let mut nodes: BTreeSet<Arc<str>> = known.nodes().iter().map(|n| known.text(*n)).collect();
@@ -226,11 +224,9 @@ pub(crate) fn conclude_ros2(known: &mut Conclusions<'_>) {
             signs,
             ends: Vec::new(),
         };
-        let is_generated = generated(&logger) == Some(node);
-        let confidence = if is_generated {
-            Confidence::Inferred
-        } else {
-            Confidence::Stated
+        let confidence = match generated(&logger) {
+            Some(above) if above == node => Confidence::Inferred,
+            _ => Confidence::Stated,
         };
         known.add(what, confidence, when);
     }

@@ -120,15 +120,13 @@ pub(crate) fn read_monitor(
     }
     for ((topic, node, is_sent), [(periods, period), (ages, age)]) in ends {
         let nanos = i64::try_from(periods).map_or(0, |many| period.saturating_mul(many));
+        // Without periods: the collector reports once a second.
+        let length = if nanos > 0 { nanos } else { 1_000_000_000 };
         context.measure(Measurement {
             topic: Some(topic),
             publisher: Some(node).filter(|_| is_sent),
             subscriber: Some(node).filter(|_| !is_sent),
-            // Without periods: the collector reports once a second.
-            span: Span::new(
-                Stamp(0),
-                Stamp(if nanos > 0 { nanos } else { 1_000_000_000 }),
-            ),
+            span: Span::new(Stamp(0), Stamp(length)),
             is_rolling: true,
             delivered: Some(periods).filter(|_| nanos > 0),
             count: ages,
