@@ -514,13 +514,17 @@ impl Recorded {
         Ok(removed)
     }
 
-    /// Keeps a part of the recording, from its beginning on (`is_first`) or not.
+    /// Keeps a part of the recording, from its beginning on (`is_first`) or not, and marks the streams without a message in it.
     ///
     /// # Errors
     /// If the temporary file of times cannot be read or written.
     pub(crate) fn cut(&mut self, part: Span, is_first: bool) -> Result<()> {
         self.clip(part).map_err(spool_error)?;
-        self.mark_outside(is_first);
+        // In a part from the beginning on, those without a message have no latched one yet.
+        for stream in &mut self.streams {
+            stream.is_outside = self.messages.bounds(stream.times).is_none();
+            stream.latched &= !(stream.is_outside && is_first);
+        }
         self.span = self.measure();
         Ok(())
     }
@@ -535,15 +539,6 @@ impl Recorded {
             }
         }
         firsts
-    }
-
-    /// Marks the streams without a message in the part of the recording that was read. In a part from the
-    /// beginning on, they have no latched message yet.
-    fn mark_outside(&mut self, is_first: bool) {
-        for stream in &mut self.streams {
-            stream.is_outside = self.messages.bounds(stream.times).is_none();
-            stream.latched &= !(stream.is_outside && is_first);
-        }
     }
 
     /// The span of all messages.

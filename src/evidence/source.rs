@@ -180,12 +180,10 @@ pub(crate) fn readers(stream: &Stream, schema: &MessageSchema) -> (Vec<(SourceId
             let fit = layout.fit(&stream.connection, &type_name, schema.outline());
             (read, fit)
         });
-        let known: Vec<_> = fits
-            .filter(|(_, fit)| *fit != LayoutFit::OtherType)
-            .collect();
-        match known.iter().find(|(_, fit)| *fit == LayoutFit::Same) {
+        let fits: Vec<_> = fits.collect();
+        match fits.iter().find(|(_, fit)| *fit == LayoutFit::Same) {
             Some((read, _)) => readers.push((id, **read)),
-            None => foreign |= !known.is_empty(),
+            None => foreign |= fits.iter().any(|(_, fit)| *fit == LayoutFit::OtherFields),
         }
     }
     (readers, foreign)

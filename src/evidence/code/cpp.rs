@@ -652,9 +652,8 @@ impl Aliases {
     fn message(&self, parameter: &str) -> Vec<String> {
         let mut name = bare(parameter);
         while let Some((outer, inner)) = name.split_once('<') {
-            let is_wrapper = ["shared_ptr", "unique_ptr", "MessageEvent"]
-                .iter()
-                .any(|w| outer.trim().ends_with(w));
+            let wrappers = ["shared_ptr", "unique_ptr", "MessageEvent"];
+            let is_wrapper = wrappers.iter().any(|end| outer.trim().ends_with(end));
             match inner.trim().strip_suffix('>').filter(|_| is_wrapper) {
                 Some(inner) => name = bare(inner),
                 None => return Vec::new(),

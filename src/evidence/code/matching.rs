@@ -80,10 +80,8 @@ pub(crate) fn conclude(code: &Code, known: &mut Conclusions<'_>) -> Outcome {
     let (inferred, undrawn) = infer_only(code, known, &bag);
     let mut notices = code.notices.clone();
     notices.push(summary(code, found.drawn, inferred, &undrawn));
-    let mut lines: Vec<String> = undrawn
-        .iter()
-        .map(|(reason, text)| format!("{text}: {}", reason.word()))
-        .collect();
+    let line = |(reason, text): &(NotDrawn, String)| format!("{text}: {}", reason.word());
+    let mut lines: Vec<String> = undrawn.iter().map(line).collect();
     lines.extend(found.remarks);
     if !found.without.is_empty() && !code.instances.is_empty() {
         let without = some_of(&found.without, MOST_NAMES);

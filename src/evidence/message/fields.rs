@@ -70,10 +70,8 @@ impl Decoders {
     /// The reason why no message can be decoded.
     pub(crate) fn new(connection: &Connection, types: &KnownTypes) -> Result<Self, String> {
         let decoder = |definition: Result<_, _>| Decoder::of(connection, &definition?);
-        let tried: Vec<_> = definitions(connection, types)?
-            .into_iter()
-            .map(decoder)
-            .collect();
+        let tried = definitions(connection, types)?.into_iter();
+        let tried: Vec<_> = tried.map(decoder).collect();
         let failed = tried.iter().skip(1).find_map(|one| one.as_ref().err());
         let why = failed.filter(|_| tried[0].is_err()).cloned();
         let mut all = Vec::new();

@@ -144,11 +144,8 @@ fn is_broadcaster(known: &Conclusions<'_>, node: Name, topic: Name) -> bool {
     let twin = known.facts.known(&twin);
     let names = |twin| {
         let listed = Observation::Lists(node, twin);
-        known
-            .facts
-            .list
-            .iter()
-            .any(|fact| fact.observation == listed)
+        let mut facts = known.facts.list.iter();
+        facts.any(|fact| fact.observation == listed)
     };
     !stated && !twin.is_some_and(names)
 }
