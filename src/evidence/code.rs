@@ -138,8 +138,9 @@ fn in_parallel(files: &[SourceFile]) -> Vec<FileRead> {
     let all: Vec<(usize, FileRead)> = std::thread::scope(|scope| {
         let readers = 0..READERS.min(files.len());
         let readers: Vec<_> = readers.map(|_| scope.spawn(work)).collect();
-        let read = readers.into_iter().map(|reader| reader.join());
-        read.flat_map(Result::unwrap_or_default).collect()
+        let readers = readers.into_iter();
+        let read = readers.flat_map(|reader| reader.join().unwrap_or_default());
+        read.collect()
     });
     // If a reader panics, its files are missing; the others keep their positions.
     let mut read: Vec<FileRead> = files.iter().map(|_| FileRead::default()).collect();
