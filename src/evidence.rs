@@ -169,7 +169,7 @@ pub const SOURCES: &[Source] = sources! {
     "service_event" "`<service>/_service_event` of service introspection"
         { reads: &[(&[events::SERVICE_EVENT], Payload(events::read_service))] }
     "qos" "offered quality of service in ROS 2 recordings"
-        { announced: Some(connection::announced), conclude: &[connection::conclude_offers] }
+        { conclude: &[connection::conclude_offers] }
     "parameter_events" "`rcl_interfaces/msg/ParameterEvent`"
         { reads: &[(&[events::PARAMETER_EVENT], Parameters(events::read_node))] }
     "qos_overrides" "`qos_overrides.<topic>` in parameter events, which rclcpp declares with each end"

@@ -88,36 +88,35 @@ fn workspace(files: &Files) -> Workspace {
     let packages = workspace::packages(&files.list);
     let (mut code, mut launches) = (Vec::new(), Vec::new());
     for (file, read) in files.list.iter().zip(in_parallel(&files.list)) {
-        match read {
-            FileRead::Code(found) => code.push((file.path.clone(), found)),
-            FileRead::Launch(nodes) => launches.push((file.path.clone(), nodes)),
-            FileRead::Nothing => {}
-        }
+        code.push((file.path.clone(), read.code));
+        launches.push((file.path.clone(), read.launched));
     }
     Workspace::new(packages, code, launches)
 }
 
 /// The result of reading one file.
-enum FileRead {
-    Code(FileCode),
-    Launch(Vec<launch::LaunchedNode>),
-    Nothing,
+#[derive(Default)]
+struct FileRead {
+    code: FileCode,
+    /// The nodes that a launch file may start.
+    launched: Vec<launch::LaunchedNode>,
 }
 
 fn read_file(file: &SourceFile) -> FileRead {
+    let mut read = FileRead::default();
     match kind(&file.path) {
-        Some(FileKind::Python | FileKind::Script) => FileRead::Code(python::read(&file.text)),
-        Some(FileKind::Cpp) => FileRead::Code(cpp::read(&file.text)),
+        Some(FileKind::Python | FileKind::Script) => read.code = python::read(&file.text),
+        Some(FileKind::Cpp) => read.code = cpp::read(&file.text),
         Some(FileKind::Launch) => {
             let path = Path::new(&file.path);
             // An unreadable launch file starts no nodes.
-            let tree = launch::tree_of(path, &file.text).ok().flatten();
-            tree.map_or(FileRead::Nothing, |tree| {
-                FileRead::Launch(launch::nodes(path, &tree))
-            })
+            if let Ok(Some(tree)) = launch::tree_of(path, &file.text) {
+                read.launched = launch::nodes(path, &tree);
+            }
         }
-        _ => FileRead::Nothing,
+        _ => {}
     }
+    read
 }
 
 /// The number of files read at once: more do not help, as the largest file dominates.
@@ -136,18 +135,15 @@ fn in_parallel(files: &[SourceFile]) -> Vec<FileRead> {
             }
         }
     };
-    let mut all: Vec<(usize, FileRead)> = std::thread::scope(|scope| {
-        let readers: Vec<_> = (0..READERS.min(files.len()))
-            .map(|_| scope.spawn(work))
-            .collect();
-        readers
-            .into_iter()
-            .flat_map(|reader| reader.join().unwrap_or_default())
-            .collect()
+    let all: Vec<(usize, FileRead)> = std::thread::scope(|scope| {
+        let readers = 0..READERS.min(files.len());
+        let readers: Vec<_> = readers.map(|_| scope.spawn(work)).collect();
+        let readers = readers.into_iter();
+        let read = readers.flat_map(|reader| reader.join().unwrap_or_default());
+        read.collect()
     });
-    all.sort_by_key(|(at, _)| *at);
     // If a reader panics, its files are missing; the others keep their positions.
-    let mut read: Vec<FileRead> = files.iter().map(|_| FileRead::Nothing).collect();
+    let mut read: Vec<FileRead> = files.iter().map(|_| FileRead::default()).collect();
     for (at, file) in all {
         read[at] = file;
     }

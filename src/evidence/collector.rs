@@ -22,7 +22,7 @@ use crate::evidence::observation::{Observations, SourceId};
 use crate::evidence::source::equal_stamps::{self, FirstHeader};
 use crate::evidence::source::{self, Read, SourceContext, echo, payload, sim_time};
 use crate::evidence::times::Stamps;
-use crate::evidence::{SOURCES, publishers};
+use crate::evidence::{publishers, source_id};
 
 /// Options for reading.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -204,25 +204,6 @@ impl Collector {
         Arc::clone(schema)
     }
 
-    /// Passes the announcement of the newest stream to every source.
-    fn announced(&mut self) {
-        let Some((place, stream)) = self.streams.iter().enumerate().next_back() else {
-            return;
-        };
-        for (source, row) in SOURCES.iter().enumerate() {
-            if let Some(announced) = row.announced {
-                announced(&mut SourceContext {
-                    facts: &mut self.facts,
-                    space: &self.space,
-                    stream,
-                    place,
-                    source,
-                    time: None,
-                });
-            }
-        }
-    }
-
     /// Passes a message to the sources that know its layout.
     fn read(&mut self, place: usize, message: &Message<'_>) {
         if let Some(Some(numbers)) = self.numbers.get_mut(place) {
@@ -354,15 +335,13 @@ impl BagSink<'_> {
 impl Sink for BagSink<'_> {
     fn connection(&mut self, connection: &Connection) -> Want {
         let all = &mut *self.collector;
-        let topic = all
-            .facts
-            .name(&in_space(&all.space, connection.topic.as_str()));
+        let topic = in_space(&all.space, connection.topic.as_str());
         let publisher = connection.publisher.as_ref();
         let publisher = publisher.map(|p| in_space(&all.space, p.as_str()));
         let stream = Stream {
             bag: self.bag,
             connection: connection.clone(),
-            topic,
+            topic: all.facts.name(&topic),
             publisher: publisher.map(|p| all.facts.name(&p)),
             latched: is_held(connection),
             trust: Reliability::Whole,
@@ -387,8 +366,8 @@ impl Sink for BagSink<'_> {
             _ => {}
         }
         if foreign {
-            all.notices
-                .add(undecodable(&stream, "its definition is not the known one"));
+            let why = "its definition is not the known one";
+            all.notices.add(undecodable(&stream, why));
         }
         let header = equal_stamps::first_header(connection, &schema);
         let stamped = all.options.infer_stamps && header.is_some();
@@ -403,6 +382,14 @@ impl Sink for BagSink<'_> {
         if let Some(streams) = all.bags.get_mut(self.bag) {
             streams.push(all.streams.len());
         }
+        source::connection::announced(&mut SourceContext {
+            facts: &mut all.facts,
+            space: &all.space,
+            stream: &stream,
+            place: all.streams.len(),
+            source: source_id("qos"),
+            time: None,
+        });
         all.streams.push(stream);
         all.layouts.push(StreamLayout {
             readers,
@@ -411,7 +398,6 @@ impl Sink for BagSink<'_> {
             header,
             schema: echo::schema(&connection.type_name, &schema).filter(|_| compared),
         });
-        all.announced();
         want
     }
 
@@ -477,8 +463,8 @@ impl Recorded {
         if self.facts.dropped > 0 {
             let text = "there are implausibly many or long names: an observation was left out";
             let dropped = self.facts.dropped;
-            self.notices
-                .add(Notice::counted(NoticeKind::Damaged, dropped, text));
+            let notice = Notice::counted(NoticeKind::Damaged, dropped, text);
+            self.notices.add(notice);
         }
         self.facts.seal();
         self.span = self.measure();
@@ -522,20 +508,23 @@ impl Recorded {
         for (series, stream) in self.facts.headers.iter_mut().zip(&self.streams) {
             *series = series.filter(|_| self.messages.count(stream.times) > 0);
         }
-        self.numbers
-            .iter_mut()
-            .flatten()
-            .for_each(|own| own.clip(span));
+        for own in self.numbers.iter_mut().flatten() {
+            own.clip(span);
+        }
         Ok(removed)
     }
 
-    /// Keeps a part of the recording, from its beginning on (`is_first`) or not.
+    /// Keeps a part of the recording, from its beginning on (`is_first`) or not, and marks the streams without a message in it.
     ///
     /// # Errors
     /// If the temporary file of times cannot be read or written.
     pub(crate) fn cut(&mut self, part: Span, is_first: bool) -> Result<()> {
         self.clip(part).map_err(spool_error)?;
-        self.mark_outside(is_first);
+        // In a part from the beginning on, those without a message have no latched one yet.
+        for stream in &mut self.streams {
+            stream.is_outside = self.messages.bounds(stream.times).is_none();
+            stream.latched &= !(stream.is_outside && is_first);
+        }
         self.span = self.measure();
         Ok(())
     }
@@ -550,15 +539,6 @@ impl Recorded {
             }
         }
         firsts
-    }
-
-    /// Marks the streams without a message in the part of the recording that was read. In a part from the
-    /// beginning on, they have no latched message yet.
-    fn mark_outside(&mut self, is_first: bool) {
-        for stream in &mut self.streams {
-            stream.is_outside = self.messages.bounds(stream.times).is_none();
-            stream.latched &= !(stream.is_outside && is_first);
-        }
     }
 
     /// The span of all messages.

@@ -18,9 +18,7 @@ use crate::evidence::inference::{
     Conclusions, ElementKey, Incident, IncidentKind, Inference, Stream, Validity, offers,
 };
 use crate::evidence::observation::{LoggedText, Measurement, Name, Observation, Observations};
-use crate::evidence::source::contract::Owners;
-use crate::evidence::times::Stamps;
-use crate::evidence::{Confidence, EvidenceLine, SOURCES, source_id, unknown};
+use crate::evidence::{Confidence, EvidenceLine, SOURCES, source_id, source_word, unknown};
 
 #[cfg(feature = "source")]
 use crate::evidence::code::{Code, matching};
@@ -115,13 +113,10 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
             (*from, *before) = (to(*from), to(*before));
         }
     }
-    let renamed = |stream: &Stream| {
-        let publisher = stream.publisher.map(to);
-        Stream {
-            topic: to(stream.topic),
-            publisher,
-            ..stream.clone()
-        }
+    let renamed = |stream: &Stream| Stream {
+        topic: to(stream.topic),
+        publisher: stream.publisher.map(to),
+        ..stream.clone()
     };
     let streams: Vec<Stream> = recorded.streams.iter().map(renamed).collect();
     let mut lines = std::mem::take(&mut facts.pieces);
@@ -165,13 +160,14 @@ fn concluded<'a>(
     let mut known = Conclusions::new(streams, &recorded.messages, facts, (start, end));
     known.take_at_their_word();
     for (row, source) in SOURCES.iter().enumerate() {
+        known.source = row;
         for conclude in source.conclude {
-            conclude(row, &mut known);
+            conclude(&mut known);
         }
     }
     let unmatched = unmatched(&known, &options.topology.entries);
     for entry in &options.topology.entries {
-        stated(&mut known, entry, (start, end), &recorded.messages);
+        stated(&mut known, entry);
     }
     let mut notices = Notices::new();
     notices.extend(options.topology.notices.iter().cloned());
@@ -180,7 +176,7 @@ fn concluded<'a>(
     #[cfg(not(feature = "source"))]
     let undrawn = Vec::new();
     unknown::conclude(&mut known);
-    explain(&mut known, &recorded.messages);
+    explain(&mut known);
     notices.extend(unmatched);
     (known, notices, undrawn)
 }
@@ -193,9 +189,7 @@ fn declared(
     notices: &mut Notices,
 ) -> Vec<String> {
     let Some(code) = code else { return Vec::new() };
-    let owners = Owners::new(known);
-    let owner = |kind: &str, topic: &str| owners.node(kind, topic);
-    let found = matching::conclude(code, known, &owner);
+    let found = matching::conclude(code, known);
     notices.extend(found.notices);
     found.undrawn
 }
@@ -238,9 +232,8 @@ fn unmatched(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> 
         }
     }
     let notice = |((what, name), (place, near)): ((&str, &String), (&String, Option<&str>))| {
-        let near = near.map_or_else(String::new, |near| {
-            format!("; the nearest name is `{near}`")
-        });
+        let near = near.map(|near| format!("; the nearest name is `{near}`"));
+        let near = near.unwrap_or_default();
         let text = format!("{place}: the bag has no {what} `{name}`{near}");
         Notice::new(NoticeKind::Note, text)
     };
@@ -248,42 +241,35 @@ fn unmatched(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> 
 }
 
 /// Explains inferences that are not based on a single message, for elements requested by `why`.
-fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
+fn explain(known: &mut Conclusions<'_>) {
     let is_asked = |inference: &&Inference| {
         known.facts.is_watched(inference.what.ends())
             && !known.worded.contains(&(inference.what, inference.source))
     };
-    let mut pieces = Vec::new();
-    for inference in known.inferences.iter().filter(is_asked) {
-        if let (Some(source), Some((time, text))) = (
-            SOURCES.get(inference.source),
-            explained(known, messages, inference),
-        ) {
-            pieces.push(EvidenceLine {
-                time,
-                source: source.word,
-                confidence: inference.confidence,
-                text,
-            });
-        }
-    }
+    let asked = known.inferences.iter().filter(is_asked);
+    let pieces = asked.filter_map(|inference| {
+        let (time, text) = explained(known, inference)?;
+        Some(EvidenceLine {
+            time,
+            source: source_word(inference.source),
+            confidence: inference.confidence,
+            text,
+        })
+    });
+    let pieces: Vec<EvidenceLine> = pieces.collect();
     known.facts.pieces.extend(pieces);
 }
 
 /// The time and text of an inference; `None` if it comes from observations with their own text.
-fn explained(
-    known: &Conclusions<'_>,
-    messages: &Stamps,
-    inference: &Inference,
-) -> Option<(Option<Stamp>, String)> {
+fn explained(known: &Conclusions<'_>, inference: &Inference) -> Option<(Option<Stamp>, String)> {
     let what = sentence(known, inference.what);
-    let about = SOURCES
-        .get(inference.source)
-        .map_or("", |source| source.about);
-    let first = |at: usize| messages.bounds(known.streams[at].times).map(|(t, _)| t);
+    let about = SOURCES.get(inference.source);
+    let about = about.map_or("", |source| source.about);
+    let first = |at: usize| known.bounds(&known.streams[at]).map(|(first, _)| first);
     match &inference.when {
         Validity::Messages(at) => {
-            let many = match messages.count(known.streams[*at].times) {
+            let times = known.streams[*at].times;
+            let many = match known.messages.map_or(0, |all| all.count(times)) {
                 0 => "no message".to_owned(),
                 1 => "1 message, here".to_owned(),
                 n => format!("{n} messages from here on"),
@@ -321,20 +307,14 @@ fn sentence(known: &Conclusions<'_>, what: ElementKey) -> String {
 }
 
 /// Adds an entry of the user's file.
-fn stated(
-    known: &mut Conclusions<'_>,
-    entry: &TopologyEntry,
-    mission: (Stamp, Stamp),
-    messages: &Stamps,
-) {
+fn stated(known: &mut Conclusions<'_>, entry: &TopologyEntry) {
+    let mission = known.mission;
     let mut name = |text: &String| match text.split_once(ANONYMOUS) {
         None => known.facts.name(text),
         Some((stem, _)) => {
             let nodes = known.nodes().iter().copied();
-            let run = nodes
-                .filter(|node| is_run_of(&known.text(*node), stem))
-                .min();
-            run.unwrap_or_else(|| known.facts.name(stem))
+            let runs = nodes.filter(|node| is_run_of(&known.text(*node), stem));
+            runs.min().unwrap_or_else(|| known.facts.name(stem))
         }
     };
     let what = match &entry.element {
@@ -360,44 +340,39 @@ fn stated(
     } else {
         ("topology", Confidence::Stated)
     };
-    let source = source_id(word);
+    known.source = source_id(word);
     if known.facts.is_watched(what.ends()) {
-        known.facts.pieces.push(EvidenceLine {
-            time: None,
-            source: word,
-            confidence,
-            text: entry.place.clone(),
-        });
+        let text = entry.place.clone();
+        known.facts.explain(known.source, confidence, None, text);
     }
-    let inference = |when| Inference::new(source, what, confidence, when);
-    known.add(inference(when));
+    known.add(what, confidence, when);
     // The time of its launch is unknown: assume that it exists while others in its namespace do.
     if entry.declared
-        && let Some(neighbour) = neighbour(known, what, messages)
+        && let Some(neighbour) = neighbour(known, what)
     {
-        known.add(inference(Validity::Like(ElementKey::Node(neighbour))));
+        let when = Validity::Like(ElementKey::Node(neighbour));
+        known.add(what, confidence, when);
     }
 }
 
 /// Whether a node has the anonymous name that a launch file makes of `stem`: with a host, a process and a number.
 fn is_run_of(node: &str, stem: &str) -> bool {
     let is_number = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
-    let suffix = node
-        .strip_prefix(stem)
-        .and_then(|rest| rest.strip_prefix('_'));
+    let rest = node.strip_prefix(stem).unwrap_or_default();
+    let suffix = rest.strip_prefix('_');
     let mut parts = suffix.unwrap_or_default().rsplit('_');
     parts.next().is_some_and(is_number) && parts.next().is_some_and(is_number)
 }
 
 /// The node that publishes for the longest time in the namespace of a node, or of an edge's node; `None` at
 /// the root.
-fn neighbour(known: &Conclusions<'_>, what: ElementKey, messages: &Stamps) -> Option<Name> {
+fn neighbour(known: &Conclusions<'_>, what: ElementKey) -> Option<Name> {
     let node = what.ends()[0]?;
     let text = known.text(node);
     let space = namespace(&text);
     let streams = known.streams.iter().filter_map(|stream| {
         let of = stream.publisher.filter(|of| *of != node)?;
-        let (first, last) = messages.bounds(stream.times)?;
+        let (first, last) = known.bounds(stream)?;
         let is_near = !space.trim_matches('/').is_empty() && namespace(&known.text(of)) == space;
         is_near.then(|| (last.since(first), of))
     });
@@ -478,9 +453,8 @@ impl StatedValues {
     pub(crate) fn lifecycle(&self, node: Name, window: Span) -> Option<Arc<str>> {
         let states = self.states.of(node);
         let next = states.partition_point(|(time, _)| *time < window.end);
-        states
-            .get(next.checked_sub(1)?)
-            .map(|(_, state)| Arc::clone(state))
+        let (_, state) = states.get(next.checked_sub(1)?)?;
+        Some(Arc::clone(state))
     }
 
     /// The transitions of a node with their times, in order.

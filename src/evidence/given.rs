@@ -18,9 +18,9 @@ use crate::base::budget::TOPOLOGY;
 use crate::base::error::{Error, Result};
 use crate::base::file;
 use crate::base::notice::{Notice, NoticeKind};
-use crate::evidence::SOURCES;
 use crate::evidence::collector::{CollectOptions, Collector};
 use crate::evidence::observation::Observation;
+use crate::evidence::source_word;
 
 /// An element by its names.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -35,6 +35,17 @@ pub enum NamedElement {
     Subscribe(String, String),
     /// A topic and its type.
     Type(String, String),
+}
+
+impl NamedElement {
+    /// A node publishes a topic, or subscribes to it.
+    fn edge(publishes: bool, node: String, topic: String) -> Self {
+        if publishes {
+            Self::Publish(node, topic)
+        } else {
+            Self::Subscribe(node, topic)
+        }
+    }
 }
 
 /// A node or edge in a file.
@@ -186,17 +197,11 @@ fn recorded(path: &Path) -> Result<Topology> {
         Observation::Type(topic, kind) => Some(NamedElement::Type(text(topic), text(kind))),
         _ => None,
     };
-    let observations = recorded.facts.list.iter();
-    let observations = observations.filter(|fact| {
-        SOURCES
-            .get(fact.source)
-            .is_some_and(|s| s.word == "rosgraph")
-    });
+    let facts = recorded.facts.list.iter();
+    let facts = facts.filter(|fact| source_word(fact.source) == "rosgraph");
+    let elements = facts.filter_map(|fact| element(&fact.observation));
     let entry = |element| TopologyEntry::new(element, bag::file_name(path));
-    let mut entries: Vec<_> = observations
-        .filter_map(|fact| element(&fact.observation))
-        .map(entry)
-        .collect();
+    let mut entries: Vec<_> = elements.map(entry).collect();
     if entries.is_empty() {
         let hint = "give a recording of `/rosgraph` or of `/nodl/observed_node`";
         let reason = "it contains no recorded graph";

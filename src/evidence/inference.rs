@@ -11,8 +11,7 @@ use crate::base::rhythm::CLOSE_NS;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::message::dynamic::is_ros1_log;
 use crate::evidence::observation::{
-    Confidence, EvidenceLine, LoggedText, Name, Observation, ObservationRecord, Observations,
-    SourceId,
+    Confidence, LoggedText, Name, Observation, ObservationRecord, Observations, SourceId,
 };
 use crate::evidence::times::{SeriesId, Stamps};
 use crate::evidence::{SOURCES, source_word};
@@ -144,20 +143,6 @@ pub(crate) struct Inference {
 }
 
 impl Inference {
-    pub(crate) fn new(
-        source: SourceId,
-        what: ElementKey,
-        confidence: Confidence,
-        when: Validity,
-    ) -> Self {
-        Self {
-            what,
-            source,
-            confidence,
-            when,
-        }
-    }
-
     /// Renumbers the names.
     pub(crate) fn rename(&mut self, to: &impl Fn(Name) -> Name) {
         self.what = self.what.renamed(to);
@@ -186,6 +171,8 @@ fn gone(streams: &[Stream]) -> BTreeSet<Option<Name>> {
 /// Everything known about a mission once all bags are read, and the conclusions so far.
 #[derive(Default)]
 pub(crate) struct Conclusions<'a> {
+    /// The source that concludes now: what is added is from it.
+    pub(crate) source: SourceId,
     pub(crate) streams: &'a [Stream],
     /// The log times of the streams' messages.
     pub(crate) messages: Option<&'a Stamps>,
@@ -237,10 +224,10 @@ impl<'a> Conclusions<'a> {
     }
 
     /// Adds an inference.
-    pub(crate) fn add(&mut self, inference: Inference) {
-        let [node, _] = inference.what.ends();
+    pub(crate) fn add(&mut self, what: ElementKey, confidence: Confidence, when: Validity) {
+        let [node, _] = what.ends();
         self.nodes.extend(node);
-        match inference.what {
+        match what {
             ElementKey::Subscribe(topic, node) => {
                 self.subscribers.grown(topic).insert(node);
             }
@@ -249,42 +236,42 @@ impl<'a> Conclusions<'a> {
             }
             ElementKey::Node(_) | ElementKey::Topic(_) => {}
         }
-        self.inferences.push(inference);
+        self.inferences.push(Inference {
+            what,
+            source: self.source,
+            confidence,
+            when,
+        });
     }
 
     /// Adds an inference, with its explanation for `why`; `time` if it belongs to one.
     pub(crate) fn because(
         &mut self,
-        inference: Inference,
+        what: ElementKey,
+        confidence: Confidence,
+        when: Validity,
         time: Option<Stamp>,
         words: impl FnOnce(&Self) -> String,
     ) {
-        if self.facts.is_watched(inference.what.ends()) {
+        if self.facts.is_watched(what.ends()) {
             let text = words(self);
-            self.worded.insert((inference.what, inference.source));
-            self.facts.pieces.push(EvidenceLine {
-                time,
-                source: source_word(inference.source),
-                confidence: inference.confidence,
-                text,
-            });
+            self.worded.insert((what, self.source));
+            self.facts.explain(self.source, confidence, time, text);
         }
-        self.add(inference);
+        self.add(what, confidence, when);
     }
 
     /// Adds the inference of a rule, valid as long as `basis`, unless the element is known already or
     /// stronger evidence contradicts it.
     pub(crate) fn infer(
         &mut self,
-        source: SourceId,
         what: ElementKey,
         basis: ElementKey,
         words: impl FnOnce(&Self) -> String,
     ) {
         if !self.knows(what) && !self.denies(what) {
             let when = Validity::Like(basis);
-            let inference = Inference::new(source, what, Confidence::Inferred, when);
-            self.because(inference, None, words);
+            self.because(what, Confidence::Inferred, when, None, words);
         }
     }
 
@@ -292,7 +279,6 @@ impl<'a> Conclusions<'a> {
     /// messages.
     pub(crate) fn infer_publisher(
         &mut self,
-        source: SourceId,
         node: Name,
         topic: Name,
         words: impl Fn(&Self) -> String,
@@ -304,8 +290,7 @@ impl<'a> Conclusions<'a> {
         for at in self.recorded.of(topic).to_vec() {
             if self.streams[at].publisher.is_none() {
                 let when = Validity::Messages(at);
-                let inference = Inference::new(source, what, Confidence::Inferred, when);
-                self.because(inference, None, &words);
+                self.because(what, Confidence::Inferred, when, None, &words);
             }
         }
     }
@@ -390,6 +375,13 @@ impl<'a> Conclusions<'a> {
         said
     }
 
+    /// Whether headers name all publishers of a topic.
+    pub(crate) fn is_reported(&self, topic: Name) -> bool {
+        let mut streams = self.recorded.of(topic).iter().map(|at| &self.streams[*at]);
+        let is_sure = |of: &Stream| of.publisher.is_some() && of.trust == Reliability::Whole;
+        self.is_recorded(topic) && streams.all(is_sure)
+    }
+
     /// Whether a node other than `node` names this topic as its own, as publisher or subscriber.
     pub(crate) fn named_by_others(&self, topic: Name, node: Name) -> bool {
         self.facts.list.iter().any(|fact| {
@@ -432,13 +424,9 @@ impl<'a> Conclusions<'a> {
 
     /// The recorded topics whose type, without `/msg`, `fits` accepts, in the order of their names.
     pub(crate) fn topics_of(&self, fits: impl Fn(&str) -> bool) -> Vec<Name> {
-        let fitting = self
-            .streams
-            .iter()
-            .filter(|s| fits(&plain_type(&s.connection.type_name)));
-        let mut topics: Vec<_> = fitting
-            .map(|s| (s.connection.topic.clone(), s.topic))
-            .collect();
+        let connections = self.streams.iter().map(|s| (&s.connection, s.topic));
+        let fitting = connections.filter(|(of, _)| fits(&plain_type(&of.type_name)));
+        let mut topics: Vec<_> = fitting.map(|(of, topic)| (&of.topic, topic)).collect();
         topics.sort();
         topics.dedup();
         topics.into_iter().map(|(_, topic)| topic).collect()
@@ -446,24 +434,10 @@ impl<'a> Conclusions<'a> {
 
     /// Adds `what` by a convention: it exists as long as `basis`, unless a complete list omits it. Headers do
     /// not contradict it, as a topic published by convention is often silent.
-    pub(crate) fn like(&mut self, source: SourceId, what: ElementKey, basis: ElementKey) {
-        if self.closed(|closed| closed.settled_lists_deny(what)) {
-            return;
+    pub(crate) fn like(&mut self, what: ElementKey, basis: ElementKey) {
+        if !self.closed(|closed| closed.settled_lists_deny(what)) {
+            self.add(what, Confidence::Inferred, Validity::Like(basis));
         }
-        let when = Validity::Like(basis);
-        self.add(Inference::new(source, what, Confidence::Inferred, when));
-    }
-
-    /// Adds, by a convention, a subscription to `topic` by a node that publishes `basis`.
-    pub(crate) fn subscribes_as_well(
-        &mut self,
-        source: SourceId,
-        node: Name,
-        basis: Name,
-        topic: Name,
-    ) {
-        let basis = ElementKey::Publish(node, basis);
-        self.like(source, ElementKey::Subscribe(topic, node), basis);
     }
 
     /// The names of all known nodes and loggers.
@@ -486,6 +460,11 @@ impl<'a> Conclusions<'a> {
             (false, Some(only), None) => *only,
             _ => node,
         }
+    }
+
+    /// The times of the first and the last message of a stream.
+    pub(crate) fn bounds(&self, stream: &Stream) -> Option<(Stamp, Stamp)> {
+        self.messages?.bounds(stream.times)
     }
 
     /// The text of a name.
@@ -521,13 +500,10 @@ pub(crate) fn offers(of_streams: &ById<usize, u32>, streams: &[Stream]) -> ById<
 // Observations taken literally, with their times: signs, and ends by observations that revoke them.
 
 impl Conclusions<'_> {
-    /// All observations of one source with their signs and ends, sorted.
-    pub(crate) fn observations(
-        &mut self,
-        source: SourceId,
-    ) -> Vec<(ObservationRecord, Vec<Stamp>, Vec<Stamp>)> {
+    /// All observations of the source that concludes now, with their signs and ends, sorted.
+    pub(crate) fn observations(&mut self) -> Vec<(ObservationRecord, Vec<Stamp>, Vec<Stamp>)> {
         let endings = self.endings();
-        let facts = self.observed(source).into_iter();
+        let facts = self.observed(self.source).into_iter();
         let times = |fact: ObservationRecord| {
             let (signs, ends) = self.signs_and_ends(&fact, &endings);
             (fact, signs, ends)
@@ -540,10 +516,9 @@ impl Conclusions<'_> {
     pub(crate) fn take_at_their_word(&mut self) {
         let endings = self.endings();
         let facts = self.facts.list.iter();
+        let many = |fact: &ObservationRecord| self.facts.times.count(fact.times);
         let records = facts.filter_map(|fact| match fact.observation {
-            Observation::Node(node) => {
-                Some(((fact.source, node), self.facts.times.count(fact.times)))
-            }
+            Observation::Node(node) => Some(((fact.source, node), many(fact))),
             _ => None,
         });
         let records: BTreeMap<(SourceId, Name), u64> = records.collect();
@@ -579,7 +554,8 @@ impl Conclusions<'_> {
                 Observation::Refused(..) => Validity::Moments(signs),
                 _ => Validity::Signs { signs, ends },
             };
-            self.add(Inference::new(fact.source, what, fact.confidence, when));
+            self.source = fact.source;
+            self.add(what, fact.confidence, when);
         }
     }
 
@@ -610,22 +586,18 @@ impl Conclusions<'_> {
     ) -> (Vec<Stamp>, Vec<Stamp>) {
         let mut signs = self.times(fact);
         let ending = match fact.observation {
-            Observation::Node(node) => Some(Observation::NodeGone(node)),
+            Observation::Node(node) => endings.get(&Observation::NodeGone(node)),
             Observation::Subscribe(node, topic)
             | Observation::Joins(node, topic)
             | Observation::SaysSubscribe(node, topic) => {
-                Some(Observation::Unsubscribe(node, topic))
+                endings.get(&Observation::Unsubscribe(node, topic))
             }
             _ => None,
         };
-        let mut ends = ending
-            .and_then(|e| endings.get(&e))
-            .cloned()
-            .unwrap_or_default();
-        let snapshots = fact
-            .snapshot
-            .and_then(|name| endings.get(&Observation::Snapshot(name)));
-        if let Some(taken) = snapshots {
+        let mut ends = ending.cloned().unwrap_or_default();
+        if let Some(name) = fact.snapshot
+            && let Some(taken) = endings.get(&Observation::Snapshot(name))
+        {
             let mut absent = absences(&signs, taken);
             if SOURCES.get(fact.source).is_some_and(|source| source.holds) {
                 hold(&mut signs, taken);
@@ -642,11 +614,8 @@ impl Conclusions<'_> {
 /// Extends snapshots that show an element to the last moments before the next ones.
 fn hold(times: &mut Vec<Stamp>, snapshots: &[Stamp]) {
     let next = |time: &Stamp| snapshots.get(snapshots.partition_point(|t| t <= time));
-    let last: Vec<Stamp> = times
-        .iter()
-        .filter_map(next)
-        .map(|next| next.plus(-1))
-        .collect();
+    let last = times.iter().filter_map(next).map(|next| next.plus(-1));
+    let last: Vec<Stamp> = last.collect();
     times.extend(last);
     times.sort_unstable();
     times.dedup();
@@ -697,21 +666,15 @@ impl Closed {
         let mut times: BTreeMap<Name, Span> = BTreeMap::new();
         for fact in &known.facts.list {
             let listed = fact.snapshot.is_some();
-            let word = source_word(fact.source);
-            if let (
-                Observation::Lists(node, _) | Observation::Publish(node, _),
-                Some((first, last)),
-                true,
-            ) = (
-                fact.observation,
-                known.facts.times.bounds(fact.times),
-                listed,
-            ) {
-                let span = times.entry(node).or_insert(Span::new(first, last));
-                span.start = span.start.min(first);
-                span.end = span.end.max(last);
+            if let Observation::Lists(node, _) | Observation::Publish(node, _) = fact.observation
+                && let Some((first, last)) = known.facts.times.bounds(fact.times)
+                && listed
+            {
+                let own = Span::new(first, last);
+                let span = times.entry(node).or_insert(own);
+                *span = span.hull(own);
             }
-            match (fact.observation, word) {
+            match (fact.observation, source_word(fact.source)) {
                 (Observation::Lists(node, topic), _)
                 | (
                     Observation::Publish(node, topic) | Observation::Subscribe(node, topic),
@@ -727,25 +690,19 @@ impl Closed {
         }
         let settled = times.iter().filter(|(_, span)| span.nanos() >= SETTLED_NS);
         closed.settled = settled.map(|(node, _)| *node).collect();
-        closed.fill(known);
-        closed
-    }
-
-    fn fill(&mut self, known: &Conclusions<'_>) {
         let mut unnamed = Vec::new();
         for stream in known.streams {
             match stream.publisher {
                 Some(node) if stream.trust == Reliability::Whole => {
-                    self.stated.grown(stream.topic).insert(node);
+                    closed.stated.grown(stream.topic).insert(node);
                 }
-                _ => {
-                    unnamed.push(stream.topic);
-                }
+                _ => unnamed.push(stream.topic),
             }
         }
         for topic in unnamed {
-            self.stated.grown(topic).clear();
+            closed.stated.grown(topic).clear();
         }
+        closed
     }
 
     /// Whether every message of a topic names its publisher, and this node is never named.
@@ -815,14 +772,9 @@ pub(crate) struct Incident {
 
 impl Conclusions<'_> {
     /// Adds an incident; one shortly after another of its kind about the same element is merged with it.
-    pub(crate) fn incident(
-        &mut self,
-        source: SourceId,
-        what: ElementKey,
-        kind: IncidentKind,
-        time: Stamp,
-    ) {
-        let own = |old: &&mut Incident| old.what == what && (old.source == source);
+    pub(crate) fn incident(&mut self, what: ElementKey, kind: IncidentKind, time: Stamp) {
+        let source = self.source;
+        let own = |old: &&mut Incident| old.what == what && old.source == source;
         if let Some(last) = self.incidents.iter_mut().rev().find(own)
             && time.since(last.until.unwrap_or(last.time)) <= CLOSE_NS
         {

@@ -3,7 +3,6 @@
 //! An observation is kept once per source with the times at which it was made, so that millions of repeated
 //! messages take no more memory than their (compressed) times.
 
-use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io;
 use std::sync::Arc;
@@ -52,6 +51,13 @@ macro_rules! observations {
             fn renamed(self, to: &impl Fn(Name) -> Name) -> Self {
                 match self {
                     $(Self::$Kind($($name),+) => Self::$Kind($(to($name)),+),)*
+                }
+            }
+
+            /// The first two names in the observation.
+            pub(crate) fn names(self) -> [Option<Name>; 2] {
+                match self {
+                    $(Self::$Kind($($name),+) => first_two(&[$($name),+]),)*
                 }
             }
         }
@@ -127,21 +133,10 @@ impl Observation {
             Self::Subscribe(node, topic)
         }
     }
+}
 
-    /// The first two names in the observation.
-    pub(crate) fn names(self) -> [Option<Name>; 2] {
-        let (first, second) = (Cell::new(None), Cell::new(None));
-        self.renamed(&|name| {
-            let slot = if first.get().is_none() {
-                &first
-            } else {
-                &second
-            };
-            slot.set(slot.get().or(Some(name)));
-            name
-        });
-        [first.get(), second.get()]
-    }
+fn first_two(names: &[Name]) -> [Option<Name>; 2] {
+    [names.first().copied(), names.get(1).copied()]
 }
 
 /// The index of a source in the table of sources.
@@ -298,15 +293,26 @@ impl Observations {
         if self.is_watched(said.observation.names()) && self.pieces.len() < budget::EVIDENCE_LINES {
             let text: String = words().chars().take(budget::EVIDENCE_LINE).collect();
             if !text.is_empty() {
-                self.pieces.push(EvidenceLine {
-                    time,
-                    source: source_word(source),
-                    confidence: said.confidence,
-                    text,
-                });
+                self.explain(source, said.confidence, time, text);
             }
         }
         self.add(source, said, time);
+    }
+
+    /// Adds a piece of evidence, by `source`.
+    pub(crate) fn explain(
+        &mut self,
+        source: SourceId,
+        confidence: Confidence,
+        time: Option<Stamp>,
+        text: String,
+    ) {
+        self.pieces.push(EvidenceLine {
+            time,
+            source: source_word(source),
+            confidence,
+            text,
+        });
     }
 
     /// Whether `why` requests an element with these names, or with this role.
@@ -445,10 +451,8 @@ impl Observations {
             new[*old] = rank;
         }
         let to = |name: Name| new.get(name).copied().unwrap_or(name);
-        self.texts = order
-            .iter()
-            .map(|old| Arc::clone(&self.texts[*old]))
-            .collect();
+        let texts = order.iter().map(|old| Arc::clone(&self.texts[*old]));
+        self.texts = texts.collect();
         self.overflow = self.overflow.map(to);
         let names = (0..).map(Name);
         self.ids = self.texts.iter().cloned().zip(names).collect();

@@ -49,10 +49,8 @@ pub(crate) fn judge(
         let mut played = false;
         for at in of_bag {
             let stream = &mut streams[*at];
-            let by_player = stream
-                .publisher
-                .is_some_and(|node| is_player(&facts.text(node)));
-            if by_player {
+            let publisher = stream.publisher;
+            if publisher.is_some_and(|node| is_player(&facts.text(node))) {
                 // A player also has a log of its own.
                 played |= !is_log(stream.connection.topic.as_str());
                 stream.trust = Reliability::Player;
@@ -144,10 +142,9 @@ fn rewritten(streams: &[Stream], of_bag: &[usize], named: &NamedTopics) -> bool 
     if !of_bag.iter().all(|at| topics.insert(streams[*at].topic)) {
         return false;
     }
-    let log = of_bag
-        .iter()
-        .find(|at| is_log(streams[**at].connection.topic.as_str()));
-    let host = log.and_then(|at| streams[*at].publisher);
+    let mut streams = of_bag.iter().map(|at| &streams[*at]);
+    let log = streams.find(|stream| is_log(stream.connection.topic.as_str()));
+    let host = log.and_then(|stream| stream.publisher);
     let guests = host.and_then(|host| named.guests.get(host));
     guests.is_some_and(|guests| !guests.is_empty())
 }
@@ -254,9 +251,8 @@ impl<'a> RewrittenBag<'a> {
                 own.grown(node).push(*at);
             }
         }
-        let bounds = of_bag
-            .iter()
-            .filter_map(|at| messages.bounds(streams[*at].times));
+        let times = of_bag.iter().map(|at| streams[*at].times);
+        let bounds = times.filter_map(|times| messages.bounds(times));
         Self {
             streams,
             of_bag,

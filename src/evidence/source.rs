@@ -42,14 +42,12 @@ pub struct Source {
     pub(crate) own: bool,
     /// Whether each of its snapshots is valid until the next one: they are made whenever something changes.
     pub(crate) holds: bool,
-    /// Reads the announcement of a connection.
-    pub(crate) announced: Option<fn(&mut SourceContext<'_>)>,
     /// Conclusions from the whole mission; run in the order of the rows.
     pub(crate) conclude: &'static [Conclude],
 }
 
 /// A function that draws a conclusion.
-pub(crate) type Conclude = fn(SourceId, &mut Conclusions<'_>);
+pub(crate) type Conclude = fn(&mut Conclusions<'_>);
 
 /// An empty source, for rows to fill in.
 pub(crate) const NOTHING: Source = Source {
@@ -58,7 +56,6 @@ pub(crate) const NOTHING: Source = Source {
     reads: &[],
     own: false,
     holds: false,
-    announced: None,
     conclude: &[],
 };
 
@@ -183,12 +180,10 @@ pub(crate) fn readers(stream: &Stream, schema: &MessageSchema) -> (Vec<(SourceId
             let fit = layout.fit(&stream.connection, &type_name, schema.outline());
             (read, fit)
         });
-        let known: Vec<_> = fits
-            .filter(|(_, fit)| *fit != LayoutFit::OtherType)
-            .collect();
-        match known.iter().find(|(_, fit)| *fit == LayoutFit::Same) {
+        let fits: Vec<_> = fits.collect();
+        match fits.iter().find(|(_, fit)| *fit == LayoutFit::Same) {
             Some((read, _)) => readers.push((id, **read)),
-            None => foreign |= !known.is_empty(),
+            None => foreign |= fits.iter().any(|(_, fit)| *fit == LayoutFit::OtherFields),
         }
     }
     (readers, foreign)

@@ -251,7 +251,7 @@ impl Stamps {
 
     /// The number of times in a sequence.
     pub(crate) fn count(&self, id: SeriesId) -> u64 {
-        self.get(id).map_or(0, |s| s.count)
+        self.series.get(id).map_or(0, |s| s.count)
     }
 
     /// The number of times of a sequence in an interval.
@@ -259,7 +259,11 @@ impl Stamps {
     /// # Errors
     /// If the unnamed file cannot be read.
     pub(crate) fn count_in(&self, id: SeriesId, span: Span) -> io::Result<u64> {
-        let blocks = self.get(id).into_iter().flat_map(|series| &series.blocks);
+        let blocks = self
+            .series
+            .get(id)
+            .into_iter()
+            .flat_map(|series| &series.blocks);
         let mut many = 0;
         for block in blocks.filter(|block| block.first < span.end && span.start <= block.last) {
             let is_inside = |(time, _): &&(Stamp, u32)| span.contains(*time);
@@ -274,17 +278,17 @@ impl Stamps {
 
     /// The first and last time of a sequence, as far as they are in blocks.
     pub(crate) fn bounds(&self, id: SeriesId) -> Option<(Stamp, Stamp)> {
-        self.get(id).and_then(|s| s.bounds)
+        self.series.get(id).and_then(|s| s.bounds)
     }
 
     /// Whether every message of a sequence came with its size.
     pub(crate) fn sized(&self, id: SeriesId) -> bool {
-        self.get(id).is_some_and(|s| !s.size_unknown)
+        self.series.get(id).is_some_and(|s| !s.size_unknown)
     }
 
     /// The bag that the times of a sequence are of.
     pub(crate) fn bag_of(&self, id: SeriesId) -> usize {
-        self.get(id).map_or(0, |series| series.bag)
+        self.series.get(id).map_or(0, |series| series.bag)
     }
 
     /// The messages of each bag by day, as they were added and as far as they are in blocks.
@@ -354,10 +358,6 @@ impl Stamps {
         }
         series.open = Vec::new();
         Ok(())
-    }
-
-    fn get(&self, id: SeriesId) -> Option<&OpenSeries> {
-        self.series.get(id)
     }
 
     fn load(&self, block: &StampBlock) -> io::Result<Vec<(Stamp, u32)>> {
@@ -486,12 +486,10 @@ impl Stamps {
 
     /// The blocks of these sequences with the indices of the sequences, the earliest last.
     fn blocks(&self, ids: &[SeriesId]) -> Vec<(usize, StampBlock)> {
-        let of = |id: &SeriesId| self.get(*id).map_or(&[][..], |s| &s.blocks);
-        let mut all: Vec<_> = ids
-            .iter()
-            .enumerate()
-            .flat_map(|(place, id)| of(id).iter().map(move |b| (place, b.clone())))
-            .collect();
+        let of = |id: &SeriesId| self.series.get(*id).map_or(&[][..], |s| &s.blocks);
+        let all = (0..).zip(ids);
+        let all = all.flat_map(|(place, id)| of(id).iter().map(move |b| (place, b.clone())));
+        let mut all: Vec<_> = all.collect();
         all.sort_by_key(|(place, b)| Reverse((b.first, *place, b.at)));
         all
     }

@@ -8,7 +8,7 @@
 use crate::base::ids::grouped;
 use crate::base::name::is_quiet;
 use crate::base::words::count;
-use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity, verb};
+use crate::evidence::inference::{Conclusions, ElementKey, Validity, verb};
 use crate::evidence::observation::{Confidence, Name, Observation};
 use crate::evidence::source::contract::Owners;
 use crate::evidence::source_id;
@@ -116,7 +116,7 @@ fn add(
     edge: ElementKey,
     words: &dyn Fn() -> String,
 ) {
-    let source = source_id(word);
+    known.source = source_id(word);
     let (ElementKey::Publish(_, topic) | ElementKey::Subscribe(topic, _)) = edge else {
         return;
     };
@@ -128,7 +128,6 @@ fn add(
         Validity::Whole
     };
     for (what, when) in [(ElementKey::Node(node), life), (edge, topics())] {
-        let inference = Inference::new(source, what, Confidence::Declared, when);
-        known.because(inference, None, |_| words());
+        known.because(what, Confidence::Declared, when, None, |_| words());
     }
 }

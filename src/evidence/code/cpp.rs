@@ -106,10 +106,8 @@ impl<'a> CppReader<'a> {
                 if name.kind() != "qualified_identifier" {
                     return None;
                 }
-                let mut scopes = self.text(name).rsplit("::");
-                scopes
-                    .nth(1)
-                    .map(|class| class.split('<').next().unwrap_or_default().trim())
+                let class = self.text(name).rsplit("::").nth(1)?;
+                Some(class.split('<').next().unwrap_or_default().trim())
             }
             _ => None,
         }
@@ -163,12 +161,11 @@ impl<'a> CppReader<'a> {
             "declaration" => self.member(node),
             "field_initializer" => {
                 if let [name, given] = children(node)[..]
-                    && let Some(first) = given
-                        .named_child(0)
-                        .filter(|n| n.kind() == "string_literal")
+                    && let Some(first) = given.named_child(0)
+                    && first.kind() == "string_literal"
                 {
-                    self.handles
-                        .insert(self.text(name).to_owned(), self.literal(first));
+                    let space = self.literal(first);
+                    self.handles.insert(self.text(name).to_owned(), space);
                 }
             }
             "function_declarator" => self.callback(node),
@@ -178,9 +175,8 @@ impl<'a> CppReader<'a> {
     }
 
     fn define(&mut self, node: Node<'a>) {
-        let clause = children(node)
-            .into_iter()
-            .find(|c| c.kind() == "base_class_clause");
+        let mut parts = children(node).into_iter();
+        let clause = parts.find(|part| part.kind() == "base_class_clause");
         let bases = clause.map(children).unwrap_or_default();
         let bases = bases.into_iter().filter(|b| b.kind() != "access_specifier");
         let last = |base: Node<'a>| {
@@ -197,41 +193,35 @@ impl<'a> CppReader<'a> {
     /// Records an assignment to a name.
     fn set(&mut self, node: Node<'a>, name: &str, value: &str) {
         if let Some([name, value]) = fields(node, [name, value]) {
-            let name = self
-                .text(name)
-                .trim_end_matches("[]")
-                .trim_start_matches(['*', '&']);
+            let name = self.text(name).trim_end_matches("[]");
+            let name = name.trim_start_matches(['*', '&']);
             self.texts.set(name.trim_start_matches("this->"), value);
         }
     }
 
     /// `ros::NodeHandle pnh("~");`
     fn handle(&mut self, node: Node<'a>) {
-        let is_handle = node
+        let kind = node
             .parent()
-            .is_some_and(|p| self.field(p, "type").contains("NodeHandle"));
-        let given = node.child_by_field_name("value").filter(|_| is_handle);
-        let Some(given) = given else {
+            .map_or("", |parent| self.field(parent, "type"));
+        let given = node.child_by_field_name("value");
+        let Some(given) = given.filter(|_| kind.contains("NodeHandle")) else {
             return;
         };
-        let name = self
-            .field(node, "declarator")
-            .trim_start_matches(['*', '&'])
-            .to_owned();
+        let name = self.field(node, "declarator");
+        let name = name.trim_start_matches(['*', '&']).to_owned();
         let written = self.text(given);
         if written.contains("getPrivateNodeHandle") || written.contains("getMTPrivateNodeHandle") {
             self.handles.insert(name, "~".to_owned());
             return;
         }
-        let mut texts = children(given)
-            .into_iter()
-            .filter(|n| n.kind() == "string_literal");
+        let parts = children(given);
+        let mut texts = parts.iter().filter(|part| part.kind() == "string_literal");
         if let Some(text) = texts.next_back() {
-            let below = children(given)
-                .first()
-                .and_then(|first| self.handles.get(self.text(*first)));
+            let first = parts.first().map_or("", |first| self.text(*first));
+            let below = self.handles.get(first);
             let below = below.map_or(String::new(), |space| format!("{space}/"));
-            self.handles.insert(name, below + &self.literal(text));
+            self.handles.insert(name, below + &self.literal(*text));
         }
     }
 
@@ -251,12 +241,8 @@ impl<'a> CppReader<'a> {
             while let Some(inner) = declarator.child_by_field_name("declarator") {
                 declarator = inner;
             }
-            self.members.insert(
-                self.text(declarator)
-                    .trim_start_matches(['*', '&'])
-                    .to_owned(),
-                kind,
-            );
+            let name = self.text(declarator).trim_start_matches(['*', '&']);
+            self.members.insert(name.to_owned(), kind);
         }
     }
 
@@ -279,9 +265,8 @@ impl<'a> CppReader<'a> {
             }
             ("param", [_, variable, value]) => self.texts.set(self.text(*variable), *value),
             ("get_parameter", [name, variable]) => {
-                if let Some(value) = self
-                    .string(*name)
-                    .and_then(|name| self.texts.parameter(&name))
+                if let Some(name) = self.string(*name)
+                    && let Some(value) = self.texts.parameter(&name)
                 {
                     self.texts.set(self.text(*variable), value);
                 }
@@ -306,32 +291,27 @@ impl<'a> CppReader<'a> {
             "call_expression" => self.call(node),
             "field_initializer" => self.initializer(node),
             "init_declarator" => {
-                let kind = node.parent().and_then(|p| p.child_by_field_name("type"));
-                let given = node
-                    .child_by_field_name("value")
-                    .filter(|v| ["argument_list", "initializer_list"].contains(&v.kind()));
-                if let (Some(kind), Some(given)) = (kind, given) {
+                if let Some(kind) = node.parent().and_then(|p| p.child_by_field_name("type"))
+                    && let Some(given) = node.child_by_field_name("value")
+                    && ["argument_list", "initializer_list"].contains(&given.kind())
+                {
                     self.constructed(node, kind, given);
                 }
             }
             "field_declaration" => {
-                let given = node
-                    .child_by_field_name("default_value")
-                    .filter(|v| v.kind() == "initializer_list");
-                if let (Some(kind), Some(given)) = (node.child_by_field_name("type"), given) {
+                if let Some([kind, given]) = fields(node, ["type", "default_value"])
+                    && given.kind() == "initializer_list"
+                {
                     self.constructed(node, kind, given);
                 }
             }
             "type_identifier" => {
                 let name = self.text(node);
-                self.classes.current().is_recorder |=
-                    is_recorder(name, node.parent().map_or("", |p| self.text(p)));
+                let full = node.parent().map_or("", |parent| self.text(parent));
+                let class = self.classes.current();
+                class.is_recorder |= is_recorder(name, full);
+                class.mentions.entry(name.to_owned()).or_insert(None);
                 self.transform(node, name);
-                self.classes
-                    .current()
-                    .mentions
-                    .entry(name.to_owned())
-                    .or_insert(None);
             }
             "identifier"
                 if self.text(node).starts_with("RCLCPP_")
@@ -374,11 +354,8 @@ impl<'a> CppReader<'a> {
                 "" => self.callback_type(&given),
                 template => self.names.types(template),
             };
-            let space = self
-                .handles
-                .get(callee.object)
-                .cloned()
-                .unwrap_or_else(|| namespace_hint(callee.object).to_owned());
+            let space = self.handles.get(callee.object).cloned();
+            let space = space.unwrap_or_else(|| namespace_hint(callee.object).to_owned());
             self.declare(node, made, &given, types, &space);
         }
     }
@@ -412,11 +389,8 @@ impl<'a> CppReader<'a> {
         }
         if let Some((made, inner)) = by_constructor(kind) {
             let types = self.names.types(inner);
-            let space = given
-                .first()
-                .and_then(|n| self.handles.get(self.text(*n)))
-                .cloned()
-                .unwrap_or_default();
+            let first = given.first().map_or("", |first| self.text(*first));
+            let space = self.handles.get(first).cloned().unwrap_or_default();
             self.declare(node, made, &given, types, &space);
         }
     }
@@ -436,11 +410,9 @@ impl<'a> CppReader<'a> {
         };
         let class = self.classes.current();
         for declaration in call.declarations() {
-            if !class
-                .declarations
-                .iter()
-                .any(|d| (d.role, &d.topic) == (declaration.role, &declaration.topic))
-            {
+            let (role, topic) = (declaration.role, &declaration.topic);
+            let mut known = class.declarations.iter();
+            if !known.any(|one| one.role == role && one.topic == *topic) {
                 class.declarations.push(declaration);
             }
         }
@@ -469,10 +441,8 @@ impl<'a> CppReader<'a> {
             line: line(node),
             text: short(self.text(node)),
         };
-        self.classes
-            .current()
-            .declarations
-            .extend(call.declarations());
+        let class = self.classes.current();
+        class.declarations.extend(call.declarations());
     }
 
     /// The message type of a callback among the arguments.
@@ -502,10 +472,9 @@ impl<'a> CppReader<'a> {
 /// verifies the guess, as only a topic of exactly this name counts.
 fn namespace_hint(object: &str) -> &'static str {
     let name = object.to_lowercase();
-    let is_private = ["pnh", "private", "priv_n", "nhp", "nh_p"]
-        .iter()
-        .any(|word| name.contains(word));
-    if is_private || name.starts_with("getprivatenodehandle") {
+    // `getPrivateNodeHandle()` is among them.
+    let words = ["pnh", "private", "priv_n", "nhp", "nh_p"];
+    if words.iter().any(|word| name.contains(word)) {
         "~"
     } else {
         ""
@@ -584,10 +553,8 @@ fn by_function(callee: &Callee<'_>) -> Option<Made> {
 fn by_constructor(kind: &str) -> Option<(Made, &str)> {
     let (before, inner) = kind.split_once('<')?;
     let inner = inner.trim().strip_suffix('>')?;
-    let (scope, name) = before
-        .trim()
-        .rsplit_once("::")
-        .unwrap_or(("", before.trim()));
+    let before = before.trim();
+    let (scope, name) = before.rsplit_once("::").unwrap_or(("", before));
     match (unscoped(scope), name) {
         ("message_filters", "Subscriber") => Some((Made::Subscriber, inner)),
         ("realtime_tools", "RealtimePublisher") => Some((Made::Publisher, inner)),
@@ -662,30 +629,22 @@ impl Aliases {
     fn types(&self, name: &str) -> Vec<String> {
         let mut full = bare(name).to_owned();
         for _ in 0..DEEPEST {
-            let (first, rest) = full
-                .split_once("::")
-                .map_or((full.as_str(), None), |(a, b)| (a, Some(b)));
-            match (self.aliases.get(first), rest) {
-                (Some(known), Some(rest)) => full = format!("{}::{rest}", bare(known)),
-                (Some(known), None) => full = bare(known).to_owned(),
-                (None, _) => break,
-            }
+            let first = full.split("::").next().unwrap_or_default();
+            let Some(known) = self.aliases.get(first) else {
+                break;
+            };
+            full = format!("{}{}", bare(known), &full[first.len()..]);
             if full.len() > 300 {
                 return Vec::new();
             }
         }
         if full.contains("::") {
-            return type_of(&full.split("::").collect::<Vec<_>>())
-                .into_iter()
-                .collect();
+            return type_of(full.split("::")).into_iter().collect();
         }
-        let in_open =
-            |space: &String| type_of(&space.split("::").chain([full.as_str()]).collect::<Vec<_>>());
-        self.open
-            .iter()
-            .filter(|space| !space.starts_with("std") || space.starts_with("std_"))
-            .filter_map(in_open)
-            .collect()
+        let is_of_std = |space: &str| space.starts_with("std") && !space.starts_with("std_");
+        let open = self.open.iter().filter(|space| !is_of_std(space));
+        let in_open = |space: &String| type_of(space.split("::").chain([full.as_str()]));
+        open.filter_map(in_open).collect()
     }
 
     /// The types of a message that a callback takes: `sensor_msgs::ImageConstPtr`, `std::shared_ptr<const T>`,
@@ -693,27 +652,20 @@ impl Aliases {
     fn message(&self, parameter: &str) -> Vec<String> {
         let mut name = bare(parameter);
         while let Some((outer, inner)) = name.split_once('<') {
-            let is_wrapper = ["shared_ptr", "unique_ptr", "MessageEvent"]
-                .iter()
-                .any(|w| outer.trim().ends_with(w));
+            let wrappers = ["shared_ptr", "unique_ptr", "MessageEvent"];
+            let is_wrapper = wrappers.iter().any(|end| outer.trim().ends_with(end));
             match inner.trim().strip_suffix('>').filter(|_| is_wrapper) {
                 Some(inner) => name = bare(inner),
                 None => return Vec::new(),
             }
         }
-        let pointers = [
-            "::ConstSharedPtr",
-            "::SharedPtr",
-            "::UniquePtr",
-            "::ConstPtr",
-            "::Ptr",
-            "ConstPtr",
-            "Ptr",
-        ];
-        let cut = pointers.iter().find_map(|end| name.strip_suffix(end));
+        let cut = POINTERS.split(' ').find_map(|end| name.strip_suffix(end));
         self.types(cut.unwrap_or(name))
     }
 }
+
+/// The ends of the names of pointers to messages.
+const POINTERS: &str = "::ConstSharedPtr ::SharedPtr ::UniquePtr ::ConstPtr ::Ptr ConstPtr Ptr";
 
 /// A name without the scopes before it.
 fn unscoped(name: &str) -> &str {
@@ -733,10 +685,8 @@ fn bare(name: &str) -> &str {
 
 impl<'a> CppReader<'a> {
     fn literal(&self, node: Node<'a>) -> String {
-        children(node)
-            .into_iter()
-            .map(|part| self.text(part))
-            .collect()
+        let parts = children(node).into_iter();
+        parts.map(|part| self.text(part)).collect()
     }
 
     fn string(&self, node: Node<'a>) -> Option<String> {

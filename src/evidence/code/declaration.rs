@@ -140,18 +140,20 @@ impl Call {
     /// The resulting publishers and subscribers.
     pub(super) fn declarations(&self) -> Vec<Declaration> {
         use Role::{Publishes, Subscribes};
-        let below = |suffix: &str| self.topic.as_ref().map(|topic| format!("{topic}{suffix}"));
-        let one = |role, suffix: &str, ending: &str| {
-            let types = self.types.iter().map(|t| format!("{t}{ending}"));
-            self.declaration(role, below(suffix), types.collect())
+        let below = |role, suffix: &str, types: Vec<String>| {
+            let topic = self.topic.as_ref().map(|topic| format!("{topic}{suffix}"));
+            self.declaration(role, topic, types)
         };
-        let fixed = |role, suffix: &str, name: &str| {
-            let types = self.types.iter().map(|_| name.to_owned());
-            self.declaration(role, below(suffix), types.collect())
+        let types = self.types.iter();
+        let one = |role, suffix, ending| {
+            let types = types.clone().map(|own| format!("{own}{ending}"));
+            below(role, suffix, types.collect())
         };
-        let image = |role, suffix: &str, name: &str| {
-            self.declaration(role, below(suffix), vec![format!("sensor_msgs/{name}")])
+        let fixed = |role, suffix, name: &str| {
+            let types = types.clone().map(|_| name.to_owned());
+            below(role, suffix, types.collect())
         };
+        let image = |role, suffix, name| below(role, suffix, vec![format!("sensor_msgs/{name}")]);
         let transform = |role, topic: &str| {
             let types = vec!["tf2_msgs/TFMessage".to_owned()];
             self.declaration(role, Some(topic.to_owned()), types)
@@ -221,8 +223,9 @@ impl Call {
 
 /// The type named by these parts, as `package/Name`: `std_msgs msg String`, `std_msgs String`. `None` for names without
 /// a package.
-pub(super) fn type_of(parts: &[&str]) -> Option<String> {
-    let parts: Vec<&str> = parts.iter().copied().filter(|p| !p.is_empty()).collect();
+pub(super) fn type_of<'a>(parts: impl IntoIterator<Item = &'a str>) -> Option<String> {
+    let parts = parts.into_iter().filter(|part| !part.is_empty());
+    let parts: Vec<&str> = parts.collect();
     let [.., package, name] = parts[..] else {
         return None;
     };

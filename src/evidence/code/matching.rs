@@ -21,6 +21,7 @@ use crate::evidence::code::workspace::{FileDeclaration, Instance};
 use crate::evidence::given::launch::join;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::observation::{Confidence, Name};
+use crate::evidence::source::contract::Owners;
 use crate::evidence::{source_id, source_word};
 
 /// An edge that the code declares for a node of the bag.
@@ -63,7 +64,7 @@ struct NamedCode {
 }
 
 /// Adds the edges that the code declares for nodes in the bag, and, if requested, the only possible declarations.
-pub(crate) fn conclude(code: &Code, known: &mut Conclusions<'_>, owner: Owner<'_>) -> Outcome {
+pub(crate) fn conclude(code: &Code, known: &mut Conclusions<'_>) -> Outcome {
     let recorded = RecordedTopics::of(known);
     let named = named(known);
     let found = draw_named(code, known, &recorded, &named);
@@ -74,15 +75,13 @@ pub(crate) fn conclude(code: &Code, known: &mut Conclusions<'_>, owner: Owner<'_
         explained: &found.explained,
         named: &known_nodes,
         logged,
-        owner,
+        owners: Owners::new(known),
     };
     let (inferred, undrawn) = infer_only(code, known, &bag);
     let mut notices = code.notices.clone();
     notices.push(summary(code, found.drawn, inferred, &undrawn));
-    let mut lines: Vec<String> = undrawn
-        .iter()
-        .map(|(reason, text)| format!("{text}: {}", reason.word()))
-        .collect();
+    let line = |(reason, text): &(NotDrawn, String)| format!("{text}: {}", reason.word());
+    let mut lines: Vec<String> = undrawn.iter().map(line).collect();
     lines.extend(found.remarks);
     if !found.without.is_empty() && !code.instances.is_empty() {
         let without = some_of(&found.without, MOST_NAMES);
@@ -340,8 +339,10 @@ fn draw(
         return false;
     }
     let when = Validity::Like(ElementKey::Node(node));
-    let inference = Inference::new(source_id("source"), what, Confidence::Declared, when);
-    known.because(inference, None, |_| sentence(found, words));
+    known.source = source_id("source");
+    known.because(what, Confidence::Declared, when, None, |_| {
+        sentence(found, words)
+    });
     true
 }
 
@@ -416,11 +417,8 @@ struct BagTopics<'a> {
     named: &'a BTreeSet<String>,
     /// Whether log records were recorded, so that a node that logs would be named.
     logged: bool,
-    owner: Owner<'a>,
+    owners: Owners,
 }
-
-/// The well-known program that alone publishes messages of a type, by the type and the topic.
-pub(crate) type Owner<'a> = &'a dyn Fn(&str, &str) -> Option<String>;
 
 /// Adds the only possible declarations if requested; returns those that were not drawn, with the reasons.
 fn infer_only(code: &Code, known: &mut Conclusions<'_>, bag: &BagTopics<'_>) -> (usize, Undrawn) {
@@ -606,7 +604,8 @@ fn reason(
     {
         return Some(NotDrawn::KnownPublisher);
     }
-    let owner = (bag.owner)(&known.kind(found.topic), &known.text(found.topic));
+    let (kind, topic) = (known.kind(found.topic), known.text(found.topic));
+    let owner = bag.owners.node(&kind, &topic);
     let is_same = |owner: &str, c: &Candidate<'_>| last_part(&c.node) == last_part(owner);
     let is_owner = |owner: &String| candidates.iter().any(|c| is_same(owner, c));
     if found.role == Role::Publishes && owner.is_some_and(|owner| !is_owner(&owner)) {
@@ -658,9 +657,9 @@ fn draw_only(code: &Code, known: &mut Conclusions<'_>, candidate: &Candidate<'_>
         words(known, candidate)
     );
     let basis = Validity::Like(ElementKey::Topic(candidate.found.topic));
+    known.source = source_id("source_only");
     for (what, when) in [(ElementKey::Node(node), Validity::Whole), (edge, basis)] {
-        let inference = Inference::new(source_id("source_only"), what, Confidence::Declared, when);
-        known.because(inference, None, |_| text.clone());
+        known.because(what, Confidence::Declared, when, None, |_| text.clone());
     }
 }
 

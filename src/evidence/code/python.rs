@@ -163,10 +163,8 @@ impl<'a> PythonReader<'a> {
         let given = self.arguments(node);
         let first = given.positional.iter().find_map(|n| self.string(*n));
         if name.chars().next().is_some_and(char::is_uppercase) {
-            self.classes
-                .current()
-                .mentions
-                .insert(name.to_owned(), first.clone());
+            let class = self.classes.current();
+            class.mentions.insert(name.to_owned(), first);
         }
         self.remark(name, object, &full, &given);
         if let Some(made) = made(name, &full) {
@@ -209,10 +207,8 @@ impl<'a> PythonReader<'a> {
                 }
                 iteration
             };
-            let next = iterations
-                .iter()
-                .flat_map(|iteration| items.iter().map(move |item| with(iteration, *item)));
-            iterations = next.collect();
+            let next = |iteration| items.iter().map(move |item| with(iteration, *item));
+            iterations = iterations.iter().flat_map(next).collect();
         }
         iterations
     }
@@ -241,10 +237,8 @@ impl<'a> PythonReader<'a> {
             && (object.starts_with("super(") || object == "Node" || object.ends_with(".Node"));
         let is_node = ["rclpy.create_node", "rclpy.node.Node", "rospy.init_node"].contains(&full);
         if is_init || is_node {
-            let named = ["node_name", "name"]
-                .iter()
-                .find_map(|name| given.named(name));
-            let named = named.into_iter().chain(given.positional.iter().copied());
+            let named = given.named("node_name name").into_iter();
+            let named = named.chain(given.positional.iter().copied());
             let node_name = named.into_iter().find_map(|n| self.string(n));
             self.classes.current().node_names.extend(node_name);
         }
@@ -293,10 +287,7 @@ impl<'a> PythonReader<'a> {
 
     /// The topic among the arguments: the one of that name, else the first text.
     fn topic(&self, given: &CallArguments<'a>) -> Option<String> {
-        let named = ["topic", "name", "topic_name", "action_name", "ns"]
-            .iter()
-            .find_map(|name| given.named(name));
-        let topic = match named {
+        let topic = match given.named("topic name topic_name action_name ns") {
             Some(named) => self.string(named),
             None => given.positional.iter().find_map(|n| self.string(*n)),
         };
@@ -305,14 +296,7 @@ impl<'a> PythonReader<'a> {
 
     /// The type among the arguments.
     fn types(&self, given: &CallArguments<'a>) -> Vec<String> {
-        let named = [
-            "msg_type",
-            "data_class",
-            "topic_type",
-            "action_type",
-            "ActionSpec",
-        ];
-        let named = named.iter().find_map(|name| given.named(name));
+        let named = given.named("msg_type data_class topic_type action_type ActionSpec");
         let all = named.into_iter().chain(given.positional.iter().copied());
         all.map(|n| self.type_name(n))
             .find(|types| !types.is_empty())
@@ -329,15 +313,14 @@ impl<'a> PythonReader<'a> {
         let parts: Vec<&str> = full.split('.').collect();
         let is_type = parts.len() >= 3 && ["msg", "action"].contains(&parts[parts.len() - 2]);
         if is_type {
-            return type_of(&parts).into_iter().collect();
+            return type_of(parts).into_iter().collect();
         }
         let is_bare =
             !written.contains('.') && full == written && written.starts_with(char::is_uppercase);
         let modules = self.wildcards.iter().filter(|m| {
             is_bare && ["msg", "action"].contains(&m.rsplit('.').next().unwrap_or_default())
         });
-        let name =
-            |module: &String| type_of(&module.split('.').chain([written]).collect::<Vec<_>>());
+        let name = |module: &String| type_of(module.split('.').chain([written]));
         modules.filter_map(name).collect()
     }
 
@@ -407,11 +390,10 @@ struct CallArguments<'a> {
 }
 
 impl<'a> CallArguments<'a> {
-    fn named(&self, name: &str) -> Option<Node<'a>> {
-        self.named
-            .iter()
-            .find(|(n, _)| *n == name)
-            .map(|(_, node)| *node)
+    /// The argument of the first of these names, separated by spaces, that has one.
+    fn named(&self, names: &str) -> Option<Node<'a>> {
+        let find = |name| self.named.iter().find(|(own, _)| *own == name);
+        names.split(' ').find_map(find).map(|(_, value)| *value)
     }
 }
 

@@ -116,9 +116,8 @@ impl Workspace {
     pub(super) fn places(&self) -> Vec<FileDeclaration> {
         let files = self.files.iter().filter(|file| !is_test(&file.path));
         let classes = files.flat_map(|file| file.code.classes.iter().map(move |c| (file, c)));
-        classes
-            .flat_map(|(file, class)| declared(file, class))
-            .collect()
+        let declared = classes.flat_map(|(file, class)| declared(file, class));
+        declared.collect()
     }
 
     /// Every node that may be started, as in the code and as in launch files.
@@ -148,9 +147,8 @@ impl Workspace {
             }
         }
         let given = classes.iter().flat_map(|c| &c.mentions);
-        let given: BTreeMap<&str, &String> = given
-            .filter_map(|(class, name)| Some((class.as_str(), name.as_ref()?)))
-            .collect();
+        let given = given.filter_map(|(class, name)| Some((class.as_str(), name.as_ref()?)));
+        let given: BTreeMap<&str, &String> = given.collect();
         for (class, name) in given {
             let parts = self.meant(class, file);
             if let Some(part) = parts.first().filter(|p| self.is_node(**p, 0)) {
@@ -215,11 +213,10 @@ impl Workspace {
     }
 
     fn component(&self, class: &str, package: usize) -> Vec<CodeNode> {
-        let parts = self.by_name.get(class).into_iter().flatten();
-        let own = parts
-            .copied()
-            .find(|part| self.file(*part).package == Some(package) && self.class(*part).is_defined);
-        own.map(|part| self.class_node(part)).into_iter().collect()
+        let mut parts = self.by_name.get(class).into_iter().flatten();
+        let is_own = |part: ClassPlace| self.file(part).package == Some(package);
+        let own = parts.find(|part| is_own(**part) && self.class(**part).is_defined);
+        own.map(|part| self.class_node(*part)).into_iter().collect()
     }
 
     /// The nodes that a program of these files starts: its own code's, and the node classes that it instantiates.
@@ -235,9 +232,10 @@ impl Workspace {
     fn free_node(&self, files: &[usize]) -> Option<CodeNode> {
         let free: Vec<ClassPlace> = files.iter().map(|file| (*file, 0)).collect();
         // rospy has one node per process, wherever it is named.
+        let classes = |file: usize| 0..self.files[file].code.classes.len();
         let all = files
             .iter()
-            .flat_map(|f| (0..self.files[*f].code.classes.len()).map(|place| (*f, place)));
+            .flat_map(|file| classes(*file).map(|place| (*file, place)));
         let names = self.names(all.filter(|part| part.1 == 0 || !self.is_node(*part, 0)));
         let path = self.files[*files.first()?].path.clone();
         let (parts, _) = self.belonging(free);
@@ -259,9 +257,8 @@ impl Workspace {
 
     /// The names that these parts give to their node.
     fn names(&self, parts: impl IntoIterator<Item = ClassPlace>) -> BTreeSet<String> {
-        let names = parts
-            .into_iter()
-            .flat_map(|part| &self.class(part).node_names);
+        let parts = parts.into_iter();
+        let names = parts.flat_map(|part| &self.class(part).node_names);
         names.cloned().collect()
     }
 
@@ -325,14 +322,10 @@ impl Workspace {
         };
         if all.len() > MOST_NAMESAKES {
             let from = all.partition_point(|part| part.0 < file);
-            let mut own = all[from..]
-                .iter()
-                .take_while(|part| part.0 == file)
-                .copied();
-            return own
-                .find(|p| self.class(*p).is_defined)
-                .into_iter()
-                .collect();
+            let own = all[from..].iter().copied();
+            let own = own.take_while(|part| part.0 == file);
+            let mut defined = own.filter(|part| self.class(*part).is_defined);
+            return defined.next().into_iter().collect();
         }
         let defined = || all.iter().copied().filter(|p| self.class(*p).is_defined);
         let here = &self.files[file];
@@ -603,9 +596,8 @@ fn glob(pattern: &str, here: &str, paths: &[&str]) -> Vec<String> {
     };
     let start = located(here, start);
     let end = end.trim_start_matches('*');
-    let matching = paths
-        .iter()
-        .filter(|p| p.starts_with(&start) && p.ends_with(end));
+    let paths = paths.iter();
+    let matching = paths.filter(|path| path.starts_with(&start) && path.ends_with(end));
     let below = matching.take(MOST).filter_map(|p| p.strip_prefix(here));
     below.map(str::to_owned).collect()
 }
@@ -629,10 +621,8 @@ fn put_in(word: &str, variables: &BTreeMap<String, String>, left: &mut usize) ->
         rest = behind;
     }
     done.push_str(rest);
-    done.split(';')
-        .filter(|w| !w.is_empty())
-        .map(str::to_owned)
-        .collect()
+    let words = done.split(';').filter(|word| !word.is_empty());
+    words.map(str::to_owned).collect()
 }
 
 /// Every `command(words …)`, without comments.

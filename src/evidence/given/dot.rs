@@ -17,13 +17,8 @@ struct DotToken {
     word: bool,
 }
 
-/// The meaning of an identifier.
-enum Thing {
-    Node(String),
-    Topic(String),
-    /// A box for several topics.
-    Group,
-}
+/// The meaning of an identifier: a node or a topic; `None` for a box for several topics.
+type Thing = Option<NamedElement>;
 
 /// Attributes by name.
 type Attributes = BTreeMap<String, String>;
@@ -41,26 +36,23 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
         topology.entries.push(entry);
     };
     for (line, thing) in things.values() {
-        match thing {
-            Thing::Node(name) => add(NamedElement::Node(name.clone()), *line),
-            Thing::Topic(name) => add(NamedElement::Topic(name.clone()), *line),
-            Thing::Group => {}
+        if let Some(element) = thing {
+            add(element.clone(), *line);
         }
     }
     for (line, from, to, attributes) in edges {
-        let thing = |id: &String| things.get(id).map(|(_, thing)| thing);
+        let thing = |id: &String| things.get(id).and_then(|(_, thing)| thing.as_ref());
         match (thing(&from), thing(&to)) {
-            (Some(Thing::Node(node)), Some(Thing::Topic(topic))) => {
+            (Some(NamedElement::Node(node)), Some(NamedElement::Topic(topic))) => {
                 add(NamedElement::Publish(node.clone(), topic.clone()), line);
             }
-            (Some(Thing::Topic(topic)), Some(Thing::Node(node))) => {
+            (Some(NamedElement::Topic(topic)), Some(NamedElement::Node(node))) => {
                 add(NamedElement::Subscribe(node.clone(), topic.clone()), line);
             }
-            (Some(Thing::Node(a)), Some(Thing::Node(b))) => {
+            (Some(NamedElement::Node(a)), Some(NamedElement::Node(b))) => {
                 // Nodes only: the topic is the first line of the label.
-                let label = attributes
-                    .get("label")
-                    .map_or("", |l| l.split("\\n").next().unwrap_or(""));
+                let label = attributes.get("label").map_or("", String::as_str);
+                let label = label.split("\\n").next().unwrap_or("");
                 if label.starts_with('/') {
                     add(NamedElement::Publish(a.clone(), label.to_owned()), line);
                     add(NamedElement::Subscribe(b.clone(), label.to_owned()), line);
@@ -100,10 +92,8 @@ fn statements(tokens: &[DotToken]) -> Statements {
             at += 1;
         }
         let mut chain = vec![token.text.clone()];
-        while tokens
-            .get(at)
-            .is_some_and(|t| t.text == "->" || t.text == "--")
-        {
+        let is_line = |token: &DotToken| token.text == "->" || token.text == "--";
+        while tokens.get(at).is_some_and(is_line) {
             chain.extend(tokens.get(at + 1).map(|t| t.text.clone()));
             at += 2;
         }
@@ -146,15 +136,14 @@ fn attributes(tokens: &[DotToken], at: &mut usize) -> Attributes {
 fn thing(id: &str, attributes: &Attributes) -> Thing {
     let shape = attributes.get("shape").map_or("", String::as_str);
     let decoded = decoded(id);
-    let name = attributes
-        .get("label")
-        .filter(|label| label.starts_with('/'));
-    let name = resolved(name.unwrap_or(&decoded));
+    let label = attributes.get("label");
+    let label = label.filter(|label| label.starts_with('/'));
+    let name = resolved(label.unwrap_or(&decoded));
     match shape {
-        "box3d" => Thing::Group,
-        "box" | "rect" | "rectangle" => Thing::Topic(name),
-        _ if id.starts_with("t_") && shape.is_empty() => Thing::Topic(name),
-        _ => Thing::Node(name),
+        "box3d" => None,
+        "box" | "rect" | "rectangle" => Some(NamedElement::Topic(name)),
+        _ if id.starts_with("t_") && shape.is_empty() => Some(NamedElement::Topic(name)),
+        _ => Some(NamedElement::Node(name)),
     }
 }
 

@@ -156,7 +156,15 @@ impl Launch {
         match child.tag.as_str() {
             "arg" | "let" => {
                 let (name, fixed, default) = (value("name"), value("value"), value("default"));
-                self.argument(scope, name.unwrap_or_default(), fixed, default);
+                let name = name.unwrap_or_default();
+                self.copied(scope.arguments.len());
+                let arguments = Rc::make_mut(&mut scope.arguments);
+                // One without a known value stays unset.
+                if let Some(fixed) = fixed {
+                    arguments.insert(name, fixed);
+                } else if let Some(default) = default {
+                    arguments.entry(name).or_insert(default);
+                }
             }
             "remap" => {
                 if let (Some(from), Some(to)) = (value("from"), value("to")) {
@@ -195,7 +203,7 @@ impl Launch {
     /// An attribute with its substitutions replaced; `None` if it is missing or only known at run time.
     fn value(&mut self, path: &Path, tree: &Tree, scope: &Scope, name: &str) -> Option<String> {
         let arguments = &scope.arguments;
-        SubstitutionContext { path, arguments }.substitute(tree.get(name)?, &mut self.budget)
+        SubstitutionContext { path, arguments }.substitute(tree.get(name)?, &mut self.budget, 0)
     }
 
     /// Whether the conditions on an element are met.
@@ -217,23 +225,6 @@ impl Launch {
             }
         }
         true
-    }
-
-    /// Sets an argument. One without a known value stays unset.
-    fn argument(
-        &mut self,
-        scope: &mut Scope,
-        name: String,
-        value: Option<String>,
-        default: Option<String>,
-    ) {
-        self.copied(scope.arguments.len());
-        let arguments = Rc::make_mut(&mut scope.arguments);
-        if let Some(fixed) = value {
-            arguments.insert(name, fixed);
-        } else if let Some(default) = default {
-            arguments.entry(name).or_insert(default);
-        }
     }
 
     /// Charges for the copy of a scope that is about to change.
@@ -269,11 +260,8 @@ impl Launch {
         if let Some((package, class)) = given.nodelet().filter(|_| node.package == "nodelet") {
             (node.package, node.program) = (package, class);
         }
-        if self
-            .budget
-            .spend(ENTRY + node.remaps.len() * ENTRY)
-            .is_none()
-        {
+        let cost = ENTRY + node.remaps.len() * ENTRY;
+        if self.budget.spend(cost).is_none() {
             return;
         }
         if self.undecided == Undecided::Taken {
@@ -290,12 +278,7 @@ impl Launch {
         let topics = given.topics(&node.package, &node.program);
         for (publishes, topic) in topics.into_iter().take(MOST_TOPICS) {
             let topic = node.resolved(&full, &topic);
-            let of = full.clone();
-            let edge = if publishes {
-                NamedElement::Publish(of, topic)
-            } else {
-                NamedElement::Subscribe(of, topic)
-            };
+            let edge = NamedElement::edge(publishes, full.clone(), topic);
             self.add(path, tree, edge);
         }
         for (_, to) in &node.remaps {
@@ -491,11 +474,7 @@ struct SubstitutionContext<'a> {
 
 impl SubstitutionContext<'_> {
     /// The text after substitution; `None` if a part of it is only known at run time, or it becomes too long.
-    fn substitute(&self, text: &str, budget: &mut LaunchWork) -> Option<String> {
-        self.at_depth(text, budget, 0)
-    }
-
-    fn at_depth(&self, text: &str, budget: &mut LaunchWork, depth: usize) -> Option<String> {
+    fn substitute(&self, text: &str, budget: &mut LaunchWork, depth: usize) -> Option<String> {
         budget.spend(text.len())?;
         let mut done = String::new();
         let mut rest = text;
@@ -505,7 +484,7 @@ impl SubstitutionContext<'_> {
             if depth >= DEEPEST_SUBSTITUTION {
                 return None;
             }
-            let inside = self.at_depth(&after[..end], budget, depth + 1)?;
+            let inside = self.substitute(&after[..end], budget, depth + 1)?;
             let value = self.value(inside.trim())?;
             budget.spend(value.len())?;
             done.push_str(&value);
@@ -525,9 +504,8 @@ impl SubstitutionContext<'_> {
         let words = unquoted(words);
         let parts: Vec<&str> = words.split_whitespace().map(unquoted).collect();
         let argument = |name: &str| self.arguments.get(name).cloned();
-        let default = words
-            .split_once(' ')
-            .map(|(_, text)| unquoted(text).to_owned());
+        let default = words.split_once(' ');
+        let default = default.map(|(_, text)| unquoted(text).to_owned());
         let both = |f: fn(&str, &str) -> bool| match parts[..] {
             [a, b] => Some(f(a, b).to_string()),
             _ => None,

@@ -310,20 +310,18 @@ impl<'a> Evaluator<'a> {
     /// The variable of a name, to be changed.
     fn variable(&mut self, node: Node<'a>) -> Option<&mut PythonValue> {
         let name = self.parsed.text(node);
-        let frames = self.frames.iter_mut().rev();
-        frames
-            .filter(|_| node.kind() == "identifier")
-            .find_map(|f| f.names.get_mut(name))
+        if node.kind() != "identifier" {
+            return None;
+        }
+        let mut frames = self.frames.iter_mut().rev();
+        frames.find_map(|frame| frame.names.get_mut(name))
     }
 
     /// A copy of the value of a name at `node`.
     fn lookup(&mut self, name: &str, node: Node<'a>) -> PythonValue {
-        let found = self.frames.iter().rev().find_map(|f| f.names.get(name));
-        match found {
-            Some(value) => {
-                let value = value.clone();
-                self.kept(value, node)
-            }
+        let mut frames = self.frames.iter().rev();
+        match frames.find_map(|frame| frame.names.get(name)).cloned() {
+            Some(value) => self.kept(value, node),
             None if self.functions.contains_key(name) => Function(name.to_owned()),
             None if name == "true" => Bool(true),
             None if name == "false" => Bool(false),
@@ -374,11 +372,9 @@ impl<'a> Evaluator<'a> {
         self.nested -= 1;
         value
     }
-}
 
-// Expressions.
+    // Expressions.
 
-impl<'a> Evaluator<'a> {
     fn expression(&mut self, node: Node<'a>) -> PythonValue {
         let unknown = Unknown(line(node));
         let field = |name| node.child_by_field_name(name);
@@ -474,20 +470,17 @@ impl<'a> Evaluator<'a> {
         let Some([left, operator, right]) = fields(node, ["left", "operator", "right"]) else {
             return unknown(node);
         };
-        let (left, right) = (self.value(left), self.value(right));
-        match self.text(operator) {
-            "+" => self.sum(left, right, node),
-            "%" => self.formatted(&left, &right, node),
+        match (self.text(operator), self.value(left), self.value(right)) {
+            ("+", left, right) => self.sum(left, right, node),
+            ("%", Text(format), values) => self.formatted(&format, &values, node),
             // `Path(…) / 'x'`
-            "/" => self.kept(
-                Text(format!("{}/{}", left.launch_text(), right.launch_text())),
-                node,
-            ),
-            sign => match (sign, left, right) {
-                ("-", Number(a), Number(b)) => a.checked_sub(b).map_or(unknown(node), Number),
-                ("*", Number(a), Number(b)) => a.checked_mul(b).map_or(unknown(node), Number),
-                _ => unknown(node),
-            },
+            ("/", left, right) => {
+                let path = format!("{}/{}", left.launch_text(), right.launch_text());
+                self.kept(Text(path), node)
+            }
+            ("-", Number(a), Number(b)) => a.checked_sub(b).map_or(unknown(node), Number),
+            ("*", Number(a), Number(b)) => a.checked_mul(b).map_or(unknown(node), Number),
+            _ => unknown(node),
         }
     }
 
@@ -510,26 +503,16 @@ impl<'a> Evaluator<'a> {
     }
 
     /// `'%s_%d' % (a, b)`
-    fn formatted(
-        &mut self,
-        format: &PythonValue,
-        values: &PythonValue,
-        at: Node<'a>,
-    ) -> PythonValue {
-        let Text(format) = format else {
-            return unknown(at);
-        };
-        let one = std::slice::from_ref(values);
+    fn formatted(&mut self, format: &str, values: &PythonValue, at: Node<'a>) -> PythonValue {
         let mut values = match values {
             List(list) => list.iter(),
-            _ => one.iter(),
+            one => std::slice::from_ref(one).iter(),
         };
         let mut parts = format.split('%');
         let mut text = parts.next().unwrap_or_default().to_owned();
         for part in parts {
-            let value = values
-                .next()
-                .map_or_else(|| "$(unknown)".to_owned(), PythonValue::launch_text);
+            let value = values.next().map(PythonValue::launch_text);
+            let value = value.unwrap_or_else(|| "$(unknown)".to_owned());
             match part.strip_prefix(['s', 'd']) {
                 Some(rest) => text.extend([&value, rest]),
                 None => return unknown(at),
@@ -568,19 +551,16 @@ impl<'a> Evaluator<'a> {
             return None;
         };
         let operator = node.child_by_field_name("operators")?;
-        let (left, right) = (self.value(left), self.value(right));
-        match self.text(operator) {
-            "==" | "is" => left.equals(&right),
-            "!=" | "is not" => left.equals(&right).map(|same| !same),
-            "in" => left.is_in(&right),
-            "not in" => left.is_in(&right).map(|inside| !inside),
-            sign => match (sign, left, right) {
-                ("<", Number(a), Number(b)) => Some(a < b),
-                (">", Number(a), Number(b)) => Some(a > b),
-                ("<=", Number(a), Number(b)) => Some(a <= b),
-                (">=", Number(a), Number(b)) => Some(a >= b),
-                _ => None,
-            },
+        match (self.text(operator), self.value(left), self.value(right)) {
+            ("==" | "is", left, right) => left.equals(&right),
+            ("!=" | "is not", left, right) => left.equals(&right).map(|same| !same),
+            ("in", left, right) => left.is_in(&right),
+            ("not in", left, right) => left.is_in(&right).map(|inside| !inside),
+            ("<", Number(a), Number(b)) => Some(a < b),
+            (">", Number(a), Number(b)) => Some(a > b),
+            ("<=", Number(a), Number(b)) => Some(a <= b),
+            (">=", Number(a), Number(b)) => Some(a >= b),
+            _ => None,
         }
     }
 
@@ -756,27 +736,20 @@ impl<'a> Evaluator<'a> {
                 let share = self.value(object).text()?;
                 share.starts_with("$(find-pkg-share").then_some(Text(share))
             }
-            "format" => {
-                let text = self.value(object).text()?;
-                formatted(&text, arguments).map(Text)
-            }
+            "format" => formatted(&self.value(object).text()?, arguments).map(Text),
             "lower" => {
                 let text = self.value(object).text()?;
                 (!text.contains("$(")).then(|| Text(text.to_lowercase()))
             }
-            "get" => {
-                if self.text(object) == "os.environ" {
-                    return plain("os.getenv", arguments);
+            "get" if self.text(object) == "os.environ" => substitution("getenv", arguments),
+            "get" => match self.value(object) {
+                Dict(map) => {
+                    let found = named(&map, &first()?.launch_text());
+                    let found = found.or(arguments.positional.get(1)).cloned();
+                    Some(found.unwrap_or(PythonValue::None))
                 }
-                match self.value(object) {
-                    Dict(map) => {
-                        let found = named(&map, &first()?.launch_text());
-                        let found = found.or(arguments.positional.get(1)).cloned();
-                        Some(found.unwrap_or(PythonValue::None))
-                    }
-                    _ => None,
-                }
-            }
+                _ => None,
+            },
             _ => None,
         }
     }
@@ -885,10 +858,8 @@ fn plain(full: &str, arguments: &Arguments) -> Option<PythonValue> {
         },
         "enumerate" => match first? {
             List(list) => {
-                let pairs = (0..)
-                    .zip(list)
-                    .map(|(n, v)| List(vec![Number(n), v.clone()]));
-                Some(List(pairs.collect()))
+                let pair = |(at, item): (i64, &PythonValue)| List(vec![Number(at), item.clone()]);
+                Some(List((0..).zip(list).map(pair).collect()))
             }
             _ => None,
         },
@@ -1054,9 +1025,7 @@ fn of_text(text: &str) -> PythonValue {
     match text {
         "true" | "True" => Bool(true),
         "false" | "False" => Bool(false),
-        other => other
-            .parse()
-            .map_or_else(|_| Text(other.to_owned()), Number),
+        _ => text.parse().map_or_else(|_| Text(text.to_owned()), Number),
     }
 }
 

@@ -17,30 +17,28 @@ use crate::base::yaml;
 const HINT: &str =
     "write `nodes:`, then below it `/name: {publishes: [/a], subscribes: [/b], start: 0, end: 60}`";
 
-/// The role of a node in a topic, a service or an action.
-#[derive(Clone, Copy)]
+/// What an endpoint belongs to.
+#[derive(Clone, Copy, PartialEq, Eq)]
 enum EndKind {
-    Publishes,
-    Subscribes,
-    Serves,
-    Calls,
-    Acts,
-    Asks,
+    Topic,
+    Service,
+    Action,
 }
 
-/// The keys of lists of endpoints, in our format and in those of other tools.
-const ENDS: [(&str, EndKind); 11] = [
-    ("publishes", EndKind::Publishes),
-    ("publishers", EndKind::Publishes),
-    ("subscribes", EndKind::Subscribes),
-    ("subscriptions", EndKind::Subscribes),
-    ("services", EndKind::Serves),
-    ("service_servers", EndKind::Serves),
-    ("clients", EndKind::Calls),
-    ("service_clients", EndKind::Calls),
-    ("actions", EndKind::Acts),
-    ("action_servers", EndKind::Acts),
-    ("action_clients", EndKind::Asks),
+/// The keys of lists of endpoints, in our format and in those of other tools, and whether the node publishes: the client of a
+/// service does, and the server of an action.
+const ENDS: [(&str, bool, EndKind); 11] = [
+    ("publishes", true, EndKind::Topic),
+    ("publishers", true, EndKind::Topic),
+    ("subscribes", false, EndKind::Topic),
+    ("subscriptions", false, EndKind::Topic),
+    ("services", false, EndKind::Service),
+    ("service_servers", false, EndKind::Service),
+    ("clients", true, EndKind::Service),
+    ("service_clients", true, EndKind::Service),
+    ("actions", true, EndKind::Action),
+    ("action_servers", true, EndKind::Action),
+    ("action_clients", false, EndKind::Action),
 ];
 
 pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
@@ -124,15 +122,13 @@ impl<'a> TopologyYaml<'a> {
             _ => return Err(self.wrong(name, &format!("`{name}` is not a mapping"))),
         };
         let is_known = |key: &str| {
-            ["start", "end"].contains(&key) || ENDS.iter().any(|(known, _)| *known == key)
+            ["start", "end"].contains(&key) || ENDS.iter().any(|(known, ..)| *known == key)
         };
         if let Some(key) = fields.keys().find(|key| !is_known(key)) {
             return Err(self.wrong(key, &format!("unknown key `{key}`")));
         }
-        let (from_ns, to_ns) = (
-            self.time(fields.get("start"))?,
-            self.time(fields.get("end"))?,
-        );
+        let from_ns = self.time(fields.get("start"))?;
+        let to_ns = self.time(fields.get("end"))?;
         if let (Some(from), Some(to)) = (from_ns, to_ns)
             && to < from
         {
@@ -151,23 +147,18 @@ impl<'a> TopologyYaml<'a> {
         let node = resolved(name);
         let entry = |element| TopologyEntry::new(element, place(self.path, self.line(name)));
         let mut entries = vec![entry(NamedElement::Node(node.clone()))];
-        for (key, kind) in ENDS {
+        for (key, publishes, kind) in ENDS {
             for (topic, own) in self.names(value.get(key), &node)? {
-                let is_service = matches!(kind, EndKind::Serves | EndKind::Calls);
+                let edge = |topic| entry(NamedElement::edge(publishes, node.clone(), topic));
+                if kind == EndKind::Action {
+                    let part = |part| edge(format!("{topic}/_action/{part}"));
+                    entries.extend(["feedback", "status"].map(part));
+                    continue;
+                }
+                let is_service = kind == EndKind::Service;
                 let own = own.or_else(|| is_service.then(|| SERVICE.to_owned()));
-                let is_action = matches!(kind, EndKind::Acts | EndKind::Asks);
-                if let Some(own) = own.filter(|_| !is_action) {
-                    entries.push(entry(NamedElement::Type(topic.clone(), own)));
-                }
-                let publishes = |topic| NamedElement::Publish(node.clone(), topic);
-                let subscribes = |topic| NamedElement::Subscribe(node.clone(), topic);
-                let parts = || ["feedback", "status"].map(|part| format!("{topic}/_action/{part}"));
-                match kind {
-                    EndKind::Publishes | EndKind::Calls => entries.push(entry(publishes(topic))),
-                    EndKind::Subscribes | EndKind::Serves => entries.push(entry(subscribes(topic))),
-                    EndKind::Acts => entries.extend(parts().map(publishes).map(entry)),
-                    EndKind::Asks => entries.extend(parts().map(subscribes).map(entry)),
-                }
+                entries.extend(own.map(|own| entry(NamedElement::Type(topic.clone(), own))));
+                entries.push(edge(topic));
             }
         }
         Ok(entries)
@@ -191,12 +182,8 @@ impl<'a> TopologyYaml<'a> {
             Some(Value::Array(list)) => list.iter().map(name).collect(),
             Some(one) => name(one).map(|name| vec![name]),
         };
-        names.ok_or_else(|| {
-            self.wrong(
-                node,
-                &format!("the topics of `{node}` are not a list of names"),
-            )
-        })
+        let reason = || format!("the topics of `{node}` are not a list of names");
+        names.ok_or_else(|| self.wrong(node, &reason()))
     }
 
     fn time(&self, value: Option<&Value>) -> Result<Option<i64>> {

@@ -367,9 +367,7 @@ fn structures(tokens: &mut dyn Iterator<Item = &str>) -> Result<Vec<MessageField
                 is_inside = true;
                 found.push(MessageFields {
                     package: modules.first().copied().unwrap_or_default().to_owned(),
-                    name: (*name).to_owned(),
-                    fields: Vec::new(),
-                    wrong: None,
+                    ..MessageFields::new(name)
                 });
             }
             ("{", ["enum", name]) => {

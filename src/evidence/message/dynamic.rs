@@ -167,9 +167,8 @@ impl MessageSchema {
         let count = match array.trim_end_matches(']') {
             "" => payload.length(1)?,
             count => {
-                let count = count
-                    .parse()
-                    .map_err(|_| payload.wrong("an array's length"))?;
+                let count = count.parse();
+                let count = count.map_err(|_| payload.wrong("an array's length"))?;
                 if count > payload.remaining() {
                     return Err(payload.wrong("a whole array"));
                 }
@@ -341,10 +340,8 @@ pub(crate) fn outline(definition: &str, type_name: &str, form: Form) -> Vec<(Str
         });
         fields.collect::<Vec<_>>().join(";")
     };
-    messages
-        .iter()
-        .map(|message| (message.name.clone(), fields(message)))
-        .collect()
+    let named = messages.iter().map(|of| (of.name.clone(), fields(of)));
+    named.collect()
 }
 
 // A log record of ROS 1 (`rosgraph_msgs/Log`) or ROS 2 (`rcl_interfaces/msg/Log`): its logger, text and source file.
@@ -365,6 +362,11 @@ pub(crate) struct LogRecord<'a> {
     pub(crate) number: Option<u32>,
     /// The topics of the node, as far as roscpp and rospy list them; none in ROS 2.
     pub(crate) topics: Vec<&'a str>,
+}
+
+/// The full name of a node that ROS 2 names with dots in a logger.
+pub(crate) fn full_name(logger: &str) -> String {
+    format!("/{}", logger.trim_start_matches('/').replace('.', "/"))
 }
 
 /// Whether a type is that of log records of ROS 1.
@@ -389,7 +391,7 @@ impl<'a> LogRecord<'a> {
         let logger = if is_ros1 || name.is_empty() {
             name.to_owned()
         } else {
-            format!("/{}", name.trim_start_matches('/').replace('.', "/"))
+            full_name(name)
         };
         let (text, file) = (payload.string()?, payload.string()?);
         payload.skip_string()?;

@@ -21,18 +21,11 @@ const DEEPEST: usize = 16;
 /// The most columns; more are hostile: messages in use have some hundred.
 const MOST_COLUMNS: usize = 2000;
 
-/// The type of a field that is not a message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Primitive {
-    /// A number or a Boolean.
-    Number(ColumnKind),
-    Text,
-}
-
 /// A step of decoding a payload.
 #[derive(Clone, Debug, PartialEq)]
 enum DecodeStep {
-    One(usize, Primitive),
+    /// A number, a Boolean or a text.
+    One(usize, ColumnKind),
     /// A list of bytes is one value.
     Bytes(usize, Array),
     /// Seconds and nanoseconds since 1970.
@@ -77,10 +70,8 @@ impl Decoders {
     /// The reason why no message can be decoded.
     pub(crate) fn new(connection: &Connection, types: &KnownTypes) -> Result<Self, String> {
         let decoder = |definition: Result<_, _>| Decoder::of(connection, &definition?);
-        let tried: Vec<_> = definitions(connection, types)?
-            .into_iter()
-            .map(decoder)
-            .collect();
+        let tried = definitions(connection, types)?.into_iter();
+        let tried: Vec<_> = tried.map(decoder).collect();
         let failed = tried.iter().skip(1).find_map(|one| one.as_ref().err());
         let why = failed.filter(|_| tried[0].is_err()).cloned();
         let mut all = Vec::new();
@@ -269,10 +260,9 @@ impl DecodePlan<'_> {
         levels: usize,
         depth: usize,
     ) -> Result<(Vec<DecodeStep>, usize), String> {
-        let number = |kind: ColumnKind| Ok((Primitive::Number(kind), kind.size()));
-        let whole = |bits, is_signed| number(ColumnKind::whole(bits, is_signed));
-        let primitive = match kind {
-            "bool" => number(ColumnKind::FLAG),
+        let whole = ColumnKind::whole;
+        let kind = match kind {
+            "bool" => ColumnKind::FLAG,
             "int8" => whole(8, true),
             // In ROS 1 `byte` is signed by definition; in ROS 2, and in practice everywhere, it is unsigned.
             "uint8" | "char" | "byte" | "octet" => whole(8, false),
@@ -282,10 +272,10 @@ impl DecodePlan<'_> {
             "uint32" => whole(32, false),
             "int64" => whole(64, true),
             "uint64" => whole(64, false),
-            "float32" => number(ColumnKind::Float { bits: 32 }),
-            "float64" => number(ColumnKind::F64),
-            "string" => Ok((Primitive::Text, 4)),
-            "wstring" => Err("wide strings are not decoded".to_owned()),
+            "float32" => ColumnKind::Float { bits: 32 },
+            "float64" => ColumnKind::F64,
+            "string" => ColumnKind::Text,
+            "wstring" => return Err("wide strings are not decoded".to_owned()),
             "time" if !self.is_cdr => return Ok(self.time(name, levels)),
             "duration" if !self.is_cdr => {
                 let mut part = |part| {
@@ -303,18 +293,17 @@ impl DecodePlan<'_> {
                 return self.message(inner, &format!("{name}."), levels, depth + 1);
             }
         };
-        let (primitive, least) = primitive?;
-        let column = self.columns.len();
-        let kind = match primitive {
-            Primitive::Number(kind) => kind,
-            Primitive::Text => ColumnKind::Text,
+        // A text begins with its length.
+        let least = if kind == ColumnKind::Text {
+            4
+        } else {
+            kind.size()
         };
+        let step = DecodeStep::One(self.columns.len(), kind);
         self.columns.push((name.to_owned(), kind, levels));
-        Ok((vec![DecodeStep::One(column, primitive)], least))
+        Ok((vec![step], least))
     }
-}
 
-impl DecodePlan<'_> {
     /// The step of a time.
     fn time(&mut self, name: &str, levels: usize) -> (Vec<DecodeStep>, usize) {
         let step = DecodeStep::Time(self.columns.len());
@@ -331,11 +320,11 @@ fn run(
 ) -> Result<(), Malformed> {
     for step in steps {
         match step {
-            DecodeStep::One(column, Primitive::Number(kind)) => {
-                numbers(payload, 1, *kind, &mut columns[*column].values)?;
-            }
-            DecodeStep::One(column, Primitive::Text) => {
+            DecodeStep::One(column, ColumnKind::Text) => {
                 text(payload, &mut columns[*column].values)?;
+            }
+            DecodeStep::One(column, kind) => {
+                numbers(payload, 1, *kind, &mut columns[*column].values)?;
             }
             DecodeStep::Bytes(column, count) => {
                 let count = many(payload, *count, 1)?;
@@ -371,8 +360,14 @@ fn run(
                     (*least).max(1)
                 };
                 let count = many(payload, *count, least)?;
-                if least > 0 {
-                    list(element, count, payload, columns)?;
+                match &element[..] {
+                    [DecodeStep::One(column, kind)] if *kind != ColumnKind::Text => {
+                        numbers(payload, count, *kind, &mut columns[*column].values)?;
+                    }
+                    _ if least > 0 => {
+                        (0..count).try_for_each(|_| run(element, payload, columns))?;
+                    }
+                    _ => {}
                 }
                 for column in &mut columns[own.clone()] {
                     column.end_list(*level, count);
@@ -393,20 +388,6 @@ fn many(payload: &mut PayloadCursor<'_>, count: Array, least: usize) -> Result<u
         }
         Array::Fixed(count) => Ok(count),
         Array::No => Ok(1),
-    }
-}
-
-fn list(
-    element: &[DecodeStep],
-    count: usize,
-    payload: &mut PayloadCursor<'_>,
-    columns: &mut [TableColumn],
-) -> Result<(), Malformed> {
-    match element {
-        [DecodeStep::One(column, Primitive::Number(kind))] => {
-            numbers(payload, count, *kind, &mut columns[*column].values)
-        }
-        _ => (0..count).try_for_each(|_| run(element, payload, columns)),
     }
 }
 
@@ -615,11 +596,8 @@ impl KnownTypes {
         let form = Form::named(&end.to_uppercase()).unwrap_or(Form::Msg);
         let all = text.and_then(|text| messages(&text, name, form));
         // The file of a service or an action defines no message of its own name.
-        let all = all.map(|all| {
-            all.into_iter()
-                .skip(usize::from(form.has_parts()))
-                .collect()
-        });
+        let own = usize::from(form.has_parts());
+        let all = all.map(|all| all.into_iter().skip(own).collect());
         let mut all: Vec<_> =
             all.unwrap_or_else(|reason| vec![MessageFields::malformed(name, reason)]);
         for reason in all.iter_mut().filter_map(|message| message.wrong.as_mut()) {
@@ -634,14 +612,10 @@ impl KnownTypes {
             Carried::Ros1 => &ROS1,
             Carried::Ros2 | Carried::OlderRos2 => &ROS2,
         };
-        let mut all = self.own.clone();
-        for is_older in [true, false] {
-            if !is_older || carried == Carried::OlderRos2 {
-                let version = built_in.iter().filter(|t| t.1 == is_older);
-                all.extend(version.map(|t| Arc::clone(&t.0)));
-            }
-        }
-        all
+        let of = |is_older: bool| built_in.iter().filter(move |t| t.1 == is_older);
+        let older = of(true).filter(|_| carried == Carried::OlderRos2);
+        let built_in = older.chain(of(false)).map(|(message, _)| message);
+        self.own.iter().chain(built_in).cloned().collect()
     }
 }
 

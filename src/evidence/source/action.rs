@@ -5,7 +5,7 @@ use super::SourceContext;
 use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::dynamic::MessageLayout;
-use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
+use crate::evidence::observation::{Confidence, Name, Observation};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// `actionlib_msgs/GoalStatusArray`.
@@ -73,20 +73,20 @@ const SENT: usize = 3;
 /// The topics of an action by part, as far as the bag contains them or a source names them.
 type Parts = [Option<Name>; 5];
 
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
     for action in ros1_actions(known) {
         let topics = PARTS.map(|part| format!("{action}/{part}"));
         let parts = topics.each_ref().map(|topic| known.facts.known(topic));
         let all = topics.map(|topic| Some(known.facts.name(&topic)));
-        tie(source, known, &parts, &all);
+        tie(known, &parts, &all);
     }
     for parts in ros2_actions(known).into_values() {
-        tie(source, known, &parts, &parts);
+        tie(known, &parts, &parts);
     }
 }
 
 /// Adds all edges that follow from the known ones.
-fn tie(source: SourceId, known: &mut Conclusions<'_>, parts: &Parts, all: &Parts) {
+fn tie(known: &mut Conclusions<'_>, parts: &Parts, all: &Parts) {
     for is_server in [true, false] {
         let (own, other): (Vec<usize>, Vec<usize>) =
             (0..PARTS.len()).partition(|part| (*part < SENT) == is_server);
@@ -101,11 +101,11 @@ fn tie(source: SourceId, known: &mut Conclusions<'_>, parts: &Parts, all: &Parts
             for topic in own.iter().filter_map(|part| all[*part]) {
                 let what = ElementKey::Publish(node, topic);
                 if what != basis {
-                    known.like(source, what, basis);
+                    known.like(what, basis);
                 }
             }
             for topic in other.iter().filter_map(|part| all[*part]) {
-                known.like(source, ElementKey::Subscribe(topic, node), basis);
+                known.like(ElementKey::Subscribe(topic, node), basis);
             }
         }
     }

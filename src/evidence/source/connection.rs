@@ -5,17 +5,16 @@ use serde_json::Value;
 
 use crate::base::name::is_log;
 use crate::base::yaml;
-use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
-use crate::evidence::observation::{Confidence, Observation, SourceId};
+use crate::evidence::inference::{Conclusions, ElementKey, Reliability, Validity};
+use crate::evidence::observation::{Confidence, Observation};
 use crate::evidence::source::SourceContext;
 
 /// Every stream is evidence for its topic, and for its publisher if that name is reliable.
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
     let streams = known.streams;
     for (at, stream) in streams.iter().enumerate() {
-        let inference = |what, when| Inference::new(source, what, Confidence::Measured, when);
         let topic = ElementKey::Topic(stream.topic);
-        known.add(inference(topic, Validity::Messages(at)));
+        known.add(topic, Confidence::Measured, Validity::Messages(at));
         let Some(node) = stream.publisher else {
             continue;
         };
@@ -25,16 +24,14 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
                 if known.named_by_others(stream.topic, node)
                     && !is_log(stream.connection.topic.as_str()) => {}
             Reliability::Whole | Reliability::Player => {
-                known.add(inference(edge, Validity::Messages(at)));
+                known.add(edge, Confidence::Measured, Validity::Messages(at));
             }
             Reliability::Likely => {
-                let when = Validity::Messages(at);
-                known.add(Inference::new(source, edge, Confidence::Inferred, when));
+                known.add(edge, Confidence::Inferred, Validity::Messages(at));
             }
             // The tool that wrote this header does not know the publishers of the other messages.
             Reliability::First => {
-                let when = Validity::First(at);
-                known.add(Inference::new(source, edge, Confidence::Stated, when));
+                known.add(edge, Confidence::Stated, Validity::First(at));
             }
             Reliability::Gone => {}
         }
@@ -44,18 +41,10 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
 // Quality of service that ROS 2 recordings keep per topic (`offered_qos_profiles`): publishers at record time, and
 // whether messages stay valid after their time (`transient_local`).
 
-/// The quality of service that one publisher offers.
-#[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Offer {
-    reliability: &'static str,
-    durability: &'static str,
-    history: String,
-}
-
 /// Whether a topic's messages are kept for late subscribers.
 pub(crate) fn is_transient_local(text: &str) -> bool {
     let offers = offers(text);
-    !offers.is_empty() && offers.iter().all(|o| o.durability == "transient_local")
+    !offers.is_empty() && offers.iter().all(|one| one.contains(" transient_local "))
 }
 
 /// Keeps the topic's quality of service in short words: `reliable transient_local depth 1`.
@@ -68,18 +57,9 @@ pub(crate) fn announced(context: &mut SourceContext<'_>) {
     if let Ok(count @ 1..) = u32::try_from(offers.len()) {
         *context.facts.offers.grown(context.place) = count;
     }
-    let same = offers.chunk_by(|a, b| a == b).map(|same| {
-        let times = if same.len() > 1 {
-            format!("{} × ", same.len())
-        } else {
-            String::new()
-        };
-        let Offer {
-            reliability,
-            durability,
-            history,
-        } = &same[0];
-        format!("{times}{reliability} {durability} {history}")
+    let same = offers.chunk_by(|a, b| a == b).map(|same| match same {
+        [one] => one.clone(),
+        _ => format!("{} × {}", same.len(), same[0]),
     });
     let words = same.collect::<Vec<_>>().join(", ");
     if !words.is_empty() {
@@ -91,26 +71,25 @@ pub(crate) fn announced(context: &mut SourceContext<'_>) {
 }
 
 /// Declares every topic with an offer, even without messages.
-pub(crate) fn conclude_offers(source: SourceId, known: &mut Conclusions<'_>) {
-    for fact in known.observed(source) {
+pub(crate) fn conclude_offers(known: &mut Conclusions<'_>) {
+    for fact in known.observed(known.source) {
         if let Observation::Quality(topic, _) = fact.observation {
             let what = ElementKey::Topic(topic);
-            let when = Validity::Whole;
-            known.add(Inference::new(source, what, Confidence::Declared, when));
+            known.add(what, Confidence::Declared, Validity::Whole);
         }
     }
 }
 
-/// The offers in a text of YAML; empty if it is not a list of them.
-fn offers(text: &str) -> Vec<Offer> {
+/// The quality of service that each publisher offers according to a text of YAML; empty if it is not a list of offers.
+fn offers(text: &str) -> Vec<String> {
     match yaml::parse(text) {
         Ok(Value::Array(list)) => list.iter().filter_map(offer).collect(),
         _ => Vec::new(),
     }
 }
 
-/// One offer; values are words since rosbag2 version 9, before that numbers of rmw.
-fn offer(value: &Value) -> Option<Offer> {
+/// One offer: reliability, durability, history. Values are words since rosbag2 version 9, before that numbers of rmw.
+fn offer(value: &Value) -> Option<String> {
     let value = value.as_object()?;
     let word = |key, words: [&'static str; 5]| match value.get(key) {
         Some(Value::Number(n)) => n
@@ -137,13 +116,11 @@ fn offer(value: &Value) -> Option<Offer> {
     ];
     let history = ["system_default", "keep_last", "keep_all", unknown, unknown];
     let depth = value.get("depth").and_then(Value::as_u64).unwrap_or(0);
-    Some(Offer {
-        reliability: word("reliability", reliability)?,
-        durability: word("durability", durability)?,
-        history: match word("history", history)? {
-            "keep_last" => format!("depth {depth}"),
-            other => other.to_owned(),
-        },
+    let reliability = word("reliability", reliability)?;
+    let durability = word("durability", durability)?;
+    Some(match word("history", history)? {
+        "keep_last" => format!("{reliability} {durability} depth {depth}"),
+        other => format!("{reliability} {durability} {other}"),
     })
 }
 
@@ -157,7 +134,7 @@ mod tests {
         let words = "- history: keep_last\n  depth: 10\n  reliability: reliable\n  durability: transient_local\n";
         assert_eq!(offers(numbers), offers(words));
         assert!(is_transient_local(numbers));
-        assert_eq!(offers(numbers)[0].history, "depth 10");
+        assert_eq!(offers(numbers)[0], "reliable transient_local depth 10");
     }
 
     #[test]

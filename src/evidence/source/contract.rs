@@ -15,7 +15,7 @@ use crate::base::ids::Few;
 use crate::base::name::{last_part, resolved};
 use crate::evidence::inference::{Conclusions, ElementKey, verb};
 use crate::evidence::message::dynamic::LogRecord;
-use crate::evidence::observation::{Name, Observation, SourceId};
+use crate::evidence::observation::{Name, Observation};
 
 const TABLE: &str = include_str!("contracts.csv");
 
@@ -67,10 +67,8 @@ struct Contract {
 
 /// The rows of the table; malformed rows are left out.
 fn contracts() -> Vec<Contract> {
-    let rows = csv::records(TABLE).unwrap_or_default();
-    rows.into_iter()
-        .skip(1)
-        .filter_map(|(line, row)| contract(line, &row))
+    let rows = csv::records(TABLE).unwrap_or_default().into_iter().skip(1);
+    rows.filter_map(|(line, row)| contract(line, &row))
         .collect()
 }
 
@@ -103,7 +101,7 @@ fn contract(line: usize, row: &[String]) -> Option<Contract> {
     })
 }
 
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
     let files = files(known);
     let nodes = known.nodes().clone();
     let mut publishers: Few<Name, Vec<(Name, Contract)>> = Few::default();
@@ -122,28 +120,21 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
                 publishers.grown(topic).push((node, contract.clone()));
             } else if !known.knows(ElementKey::Publish(node, topic)) {
                 let what = ElementKey::Subscribe(topic, node);
-                known.infer(source, what, ElementKey::Node(node), |known| {
+                known.infer(what, ElementKey::Node(node), |known| {
                     words(known, node, &contract)
                 });
             }
         }
     }
     for (topic, nodes) in publishers.with_ids() {
-        publish(source, known, topic, nodes);
-    }
-}
-
-/// Adds the publishers of a topic, unless there would be more than the bag counts.
-fn publish(source: SourceId, known: &mut Conclusions<'_>, topic: Name, nodes: &[(Name, Contract)]) {
-    let all: BTreeSet<Name> = known
-        .publishers(topic)
-        .chain(nodes.iter().map(|n| n.0))
-        .collect();
-    if known.offers(topic).is_some_and(|n| all.len() > n as usize) {
-        return;
-    }
-    for (node, contract) in nodes {
-        known.infer_publisher(source, *node, topic, |known| words(known, *node, contract));
+        let new = nodes.iter().map(|(node, _)| *node);
+        let all: BTreeSet<Name> = known.publishers(topic).chain(new).collect();
+        // There are no more than the bag counts.
+        if known.offers(topic).is_none_or(|n| all.len() <= n as usize) {
+            for (node, contract) in nodes {
+                known.infer_publisher(*node, topic, |known| words(known, *node, contract));
+            }
+        }
     }
 }
 
@@ -194,20 +185,15 @@ impl Owners {
     ) -> Vec<(bool, Name)> {
         let owner = self.0.iter().find(|c| c.owns && c.kind == kind);
         let is_other = |row: &&Contract| {
-            let is_same =
-                |owner: &Contract| (&owner.node, &owner.package) == (&row.node, &row.package);
-            owner.is_some_and(is_same)
+            owner.is_some_and(|own| own.node == row.node && own.package == row.package)
         };
         let recorded = |row: &Contract| {
             let topic = known.facts.known(&resolved(&row.topic, node));
             let topic = topic.filter(|topic| known.kind(*topic) == row.kind)?;
             Some((row.publishes, topic))
         };
-        self.0
-            .iter()
-            .filter(is_other)
-            .filter_map(recorded)
-            .collect()
+        let others = self.0.iter().filter(is_other);
+        others.filter_map(recorded).collect()
     }
 }
 

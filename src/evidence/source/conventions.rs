@@ -6,42 +6,38 @@ use std::sync::Arc;
 
 use crate::base::ids::Few;
 use crate::base::name::{is_log, start};
-use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
-use crate::evidence::observation::{Confidence, Name, SourceId};
+use crate::evidence::inference::{Conclusions, ElementKey, Validity};
+use crate::evidence::observation::{Confidence, Name};
 use crate::evidence::source::SHARED;
 
 // Bonds: a node that publishes a bond topic (`bond/Status`) also subscribes to it.
 
-pub(crate) fn bond(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn bond(known: &mut Conclusions<'_>) {
     for topic in known.topics_of(|kind| kind == "bond/Status") {
         for node in known.publishers(topic).collect::<Vec<_>>() {
-            known.subscribes_as_well(source, node, topic, topic);
+            let basis = ElementKey::Publish(node, topic);
+            known.like(ElementKey::Subscribe(topic, node), basis);
         }
     }
 }
 
 // A subscriber of `/tf` also subscribes to `/tf_static`, and vice versa: tf2 always subscribes to both.
 
-const PAIR: [&str; 2] = ["tf", "tf_static"];
-
-pub(crate) fn tf_pair(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn tf_pair(known: &mut Conclusions<'_>) {
     let listened: Vec<(Name, Name)> = known.subscriptions().collect();
     for (topic, node) in listened {
         let text = known.text(topic);
-        let Some((space, last)) = text.rsplit_once('/') else {
-            continue;
+        let twin = match text.rsplit_once('/') {
+            Some((space, "tf")) => format!("{space}/tf_static"),
+            Some((space, "tf_static")) => format!("{space}/tf"),
+            _ => continue,
         };
-        let Some(at) = PAIR.iter().position(|name| *name == last) else {
-            continue;
-        };
-        let twin = known.facts.known(&format!("{space}/{}", PAIR[1 - at]));
+        let twin = known.facts.known(&twin);
         if let Some(twin) = twin.filter(|t| known.kind(*t) == "tf2_msgs/TFMessage") {
             let basis = ElementKey::Subscribe(topic, node);
-            known.infer(source, ElementKey::Subscribe(twin, node), basis, |known| {
-                format!(
-                    "{} subscribes to {text}, and tf2 always subscribes to both",
-                    known.text(node)
-                )
+            known.infer(ElementKey::Subscribe(twin, node), basis, |known| {
+                let node = known.text(node);
+                format!("{node} subscribes to {text}, and tf2 always subscribes to both")
             });
         }
     }
@@ -54,7 +50,7 @@ pub(crate) fn tf_pair(source: SourceId, known: &mut Conclusions<'_>) {
 /// not set, or the number is not a time. With less, nodes of a robot that is never shut down would lose their start.
 const LONGEST_NS: i64 = 30 * 86_400_000_000_000;
 
-pub(crate) fn anonymous(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn anonymous(known: &mut Conclusions<'_>) {
     let (first, last) = known.mission;
     for node in known.nodes().clone() {
         let Some(start) = start(&known.text(node)) else {
@@ -65,8 +61,7 @@ pub(crate) fn anonymous(source: SourceId, known: &mut Conclusions<'_>) {
         }
         let what = ElementKey::Node(node);
         let when = Validity::begin(start.max(first));
-        let inference = Inference::new(source, what, Confidence::Stated, when);
-        known.because(inference, Some(start), |known| {
+        known.because(what, Confidence::Stated, when, Some(start), |known| {
             format!("the name {} contains this start time", known.text(node))
         });
     }
@@ -75,15 +70,14 @@ pub(crate) fn anonymous(source: SourceId, known: &mut Conclusions<'_>) {
 // The publisher of a topic with messages that name none: if only one node is known to publish it, the messages are from
 // that node. For example, if only `/gps` is known to publish `/fix` from its log, it sent all messages of `/fix`.
 
-pub(crate) fn only_publisher(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn only_publisher(known: &mut Conclusions<'_>) {
     for (at, stream) in known.streams.iter().enumerate() {
         if stream.publisher.is_some() || SHARED.contains(&stream.connection.topic.as_str()) {
             continue;
         }
         if let Some(only) = known.only_publisher(stream.topic) {
             let what = ElementKey::Publish(only, stream.topic);
-            let when = Validity::Messages(at);
-            known.add(Inference::new(source, what, Confidence::Inferred, when));
+            known.add(what, Confidence::Inferred, Validity::Messages(at));
         }
     }
 }
@@ -91,16 +85,14 @@ pub(crate) fn only_publisher(source: SourceId, known: &mut Conclusions<'_>) {
 // `dynamic_reconfigure` of ROS 1: `<node>/parameter_descriptions` and `<node>/parameter_updates` belong to
 // one node. A caller of another name, unless the topic is below it, runs that node as a nodelet.
 
+const CONFIGS: [&str; 2] = [
+    "dynamic_reconfigure/ConfigDescription",
+    "dynamic_reconfigure/Config",
+];
 const TOPICS: [&str; 2] = ["/parameter_descriptions", "/parameter_updates"];
 
-pub(crate) fn dynamic_reconfigure(source: SourceId, known: &mut Conclusions<'_>) {
-    let is_config = |kind: &str| {
-        matches!(
-            kind,
-            "dynamic_reconfigure/ConfigDescription" | "dynamic_reconfigure/Config"
-        )
-    };
-    for topic in known.topics_of(is_config) {
+pub(crate) fn dynamic_reconfigure(known: &mut Conclusions<'_>) {
+    for topic in known.topics_of(|kind| CONFIGS.contains(&kind)) {
         let text = known.text(topic);
         let Some(node) = TOPICS.iter().find_map(|end| text.strip_suffix(end)) else {
             continue;
@@ -110,16 +102,19 @@ pub(crate) fn dynamic_reconfigure(source: SourceId, known: &mut Conclusions<'_>)
         for caller in &callers {
             for other in pair.iter().filter(|t| **t != topic) {
                 let basis = ElementKey::Publish(*caller, topic);
-                known.like(source, ElementKey::Publish(*caller, *other), basis);
+                known.like(ElementKey::Publish(*caller, *other), basis);
             }
             if is_nodelet(&known.text(*caller), node) {
                 let node = known.facts.name(node);
-                known.like(source, ElementKey::Node(node), ElementKey::Node(*caller));
+                known.like(ElementKey::Node(node), ElementKey::Node(*caller));
             }
         }
         if callers.is_empty() {
             let node = known.facts.name(node);
-            own_config(source, known, node, topic);
+            let what = ElementKey::Publish(node, topic);
+            for (at, _) in (0..).zip(known.streams).filter(|(_, s)| s.topic == topic) {
+                known.add(what, Confidence::Inferred, Validity::Messages(at));
+            }
         }
     }
 }
@@ -127,17 +122,6 @@ pub(crate) fn dynamic_reconfigure(source: SourceId, known: &mut Conclusions<'_>)
 /// Whether a topic of `node` that `caller` publishes shows a nodelet, not a part of the caller.
 fn is_nodelet(caller: &str, node: &str) -> bool {
     caller != node && !node.starts_with(&format!("{caller}/"))
-}
-
-/// Adds the publication of a node whose topic has no known publisher.
-fn own_config(source: SourceId, known: &mut Conclusions<'_>, node: Name, topic: Name) {
-    for (at, stream) in known.streams.iter().enumerate() {
-        if stream.topic == topic {
-            let what = ElementKey::Publish(node, topic);
-            let when = Validity::Messages(at);
-            known.add(Inference::new(source, what, Confidence::Inferred, when));
-        }
-    }
 }
 
 // Private names: a topic below a node's own full name, or of that name, belongs to the node, so it publishes it if no other
@@ -148,7 +132,7 @@ const TAKEN: &str = "\
     goal cancel cmd command set input target desired reference request trigger enable disable reset \
     joint_trajectory sub_";
 
-pub(crate) fn private_name(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn private_name(known: &mut Conclusions<'_>) {
     let nodes: NodesByName = known.nodes().iter().map(|n| (known.text(*n), *n)).collect();
     let spaces = spaces(&nodes);
     for topic in known.topics_of(|_| true) {
@@ -162,7 +146,7 @@ pub(crate) fn private_name(source: SourceId, known: &mut Conclusions<'_>) {
             continue;
         }
         if let Some(node) = owner(&name, &nodes, &spaces) {
-            known.infer_publisher(source, node, topic, |known| {
+            known.infer_publisher(node, topic, |known| {
                 let [topic, node] = [topic, node].map(|name| known.text(name));
                 format!("{topic} is in the private namespace of {node}")
             });
@@ -180,10 +164,8 @@ fn spaces(nodes: &NodesByName) -> BTreeSet<&str> {
 
 /// The namespaces of a name, the nearest first, without the root.
 fn above(name: &str) -> impl Iterator<Item = &str> {
-    let slashes = name.rmatch_indices('/');
-    slashes
-        .map(|(at, _)| &name[..at])
-        .filter(|space| !space.is_empty())
+    let spaces = name.rmatch_indices('/').map(|(at, _)| &name[..at]);
+    spaces.filter(|space| !space.is_empty())
 }
 
 /// The node of a topic's name, or with the longest name above it, unless that name is also a namespace of other nodes.
@@ -209,17 +191,13 @@ struct Twin {
     own: BTreeSet<String>,
 }
 
-pub(crate) fn sister(source: SourceId, known: &mut Conclusions<'_>) {
-    for twins in families(known)
-        .into_values()
-        .filter(|twins| twins.len() <= MOST)
-    {
+pub(crate) fn sister(known: &mut Conclusions<'_>) {
+    let families = families(known).into_values();
+    for twins in families.filter(|twins| twins.len() <= MOST) {
         for one in &twins {
-            let alike = twins
-                .iter()
-                .filter(|other| other.node != one.node && other.own == one.own);
-            for other in alike {
-                copy(source, known, one, other);
+            let is_alike = |other: &&Twin| other.node != one.node && other.own == one.own;
+            for other in twins.iter().filter(is_alike) {
+                copy(known, one, other);
             }
         }
     }
@@ -238,10 +216,9 @@ fn families(known: &Conclusions<'_>) -> BTreeMap<String, Vec<Twin>> {
         else {
             continue;
         };
-        let own: BTreeSet<String> = topics
-            .iter()
-            .filter_map(|t| inside(&known.text(*t), space))
-            .collect();
+        let own = topics.iter();
+        let own = own.filter_map(|topic| inside(&known.text(*topic), space));
+        let own: BTreeSet<String> = own.collect();
         if own.len() >= FEWEST {
             families.entry(last.to_owned()).or_default().push(Twin {
                 node,
@@ -263,7 +240,7 @@ fn inside(topic: &str, space: &str) -> Option<String> {
 }
 
 /// Adds for `to` the subscriptions of `from`, if the bag has the topics.
-fn copy(source: SourceId, known: &mut Conclusions<'_>, from: &Twin, to: &Twin) {
+fn copy(known: &mut Conclusions<'_>, from: &Twin, to: &Twin) {
     let subscribed = known.subscriptions().filter(|(_, node)| *node == from.node);
     let topics: Vec<Name> = subscribed.map(|(topic, _)| topic).collect();
     for topic in topics {
@@ -274,7 +251,7 @@ fn copy(source: SourceId, known: &mut Conclusions<'_>, from: &Twin, to: &Twin) {
         let own = |twin| known.knows(ElementKey::Publish(to.node, twin));
         if let Some(twin) = twin.filter(|t| known.is_recorded(*t) && !own(*t)) {
             let what = ElementKey::Subscribe(twin, to.node);
-            known.infer(source, what, ElementKey::Node(to.node), |known| {
+            known.infer(what, ElementKey::Node(to.node), |known| {
                 format!(
                     "{} publishes the same topics in its namespace and subscribes to {}",
                     known.text(from.node),

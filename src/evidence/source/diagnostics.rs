@@ -2,10 +2,10 @@
 //! subscribes to `/diagnostics`.
 
 use super::SourceContext;
-use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
+use crate::evidence::inference::{Conclusions, ElementKey, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::dynamic::MessageLayout;
-use crate::evidence::observation::{Confidence, Observation, SourceId};
+use crate::evidence::observation::{Confidence, Name, Observation};
 use std::collections::BTreeSet;
 
 /// `diagnostic_msgs/DiagnosticArray`, since `diagnostic_msgs` 1.2.
@@ -62,32 +62,32 @@ fn node(name: &str) -> Option<&str> {
 
 /// Adds publishers by the names in statuses, if the header does not name the publisher. A status may be named after anything,
 /// so only names that are those of nodes by other evidence count.
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
-    let stated = |topic| {
-        let mut of = known.streams.iter().filter(|s| s.topic == topic);
-        of.all(|s| s.publisher.is_some() && s.trust == Reliability::Whole)
-    };
-    let observations = known.facts.list.iter().map(|fact| fact.observation);
-    let unnamed: BTreeSet<Observation> = observations
-        .filter(
-            |observation| matches!(observation, Observation::Reports(_, topic) if !stated(*topic)),
-        )
-        .collect();
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
+    let reports = known
+        .facts
+        .list
+        .iter()
+        .filter_map(|fact| match fact.observation {
+            Observation::Reports(_, topic) => Some(topic),
+            _ => None,
+        });
+    let unnamed: BTreeSet<Name> = reports.filter(|topic| !known.is_reported(*topic)).collect();
     let names = known.names();
-    for (fact, signs, ends) in known.observations(source) {
+    for (fact, signs, ends) in known.observations() {
         let Observation::Reports(node, topic) = fact.observation else {
             continue;
         };
         let node = known.meant(node);
-        if unnamed.contains(&fact.observation) && names.contains(&node) {
+        if unnamed.contains(&topic) && names.contains(&node) {
             let what = ElementKey::Publish(node, topic);
             let when = Validity::Signs { signs, ends };
-            known.add(Inference::new(source, what, Confidence::Inferred, when));
+            known.add(what, Confidence::Inferred, when);
         }
     }
     let [all, each] = ["/diagnostics_agg", "/diagnostics"].map(|name| known.facts.name(name));
     for node in known.publishers(all).collect::<Vec<_>>() {
-        known.subscribes_as_well(source, node, all, each);
+        let basis = ElementKey::Publish(node, all);
+        known.like(ElementKey::Subscribe(each, node), basis);
     }
 }
 

@@ -9,10 +9,10 @@ use super::SourceContext;
 use crate::base::ids::{Few, grouped};
 use crate::base::name::{in_space, is_log, plain_type};
 use crate::base::time::Stamp;
-use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
+use crate::evidence::inference::{Conclusions, ElementKey, Validity};
 use crate::evidence::message::cursor::PayloadCursor;
 use crate::evidence::message::dynamic::{LogRecord, MessageSchema, MessageValue};
-use crate::evidence::observation::{Confidence, LoggedText, Name, ShownValue, SourceId};
+use crate::evidence::observation::{Confidence, LoggedText, Name, ShownValue};
 
 /// The fewest different values that are significant: two may agree by chance, and numbers are more often equal than words. With
 /// fewer, a text `state: 3` beside a counter would be an echo of it; with more, short recordings of a talker would show none.
@@ -60,30 +60,22 @@ pub(crate) fn keep(context: &mut SourceContext<'_>, schema: &MessageSchema, payl
     if let (Ok(value), Some(time)) = (value, context.time) {
         let mut values = Vec::new();
         collect(&value, &mut values);
+        let logged = &mut context.facts.logged;
         for (field, value) in values.iter().enumerate() {
-            context
-                .facts
-                .logged
-                .show(time, (context.place, field), value);
+            logged.show(time, (context.place, field), value);
         }
     }
 }
+
+/// Packages of ROS itself, whose messages nodes do not log.
+const OF_ROS: &str = "rosgraph_msgs rcl_interfaces tf2_msgs tf roslib bond";
 
 /// The schema for parsing the messages of a type, whose definition has this one; `None` for those without words or numbers of
 /// their own.
 pub(crate) fn schema(type_name: &str, defined: &Arc<MessageSchema>) -> Option<Arc<MessageSchema>> {
     let plain = plain_type(type_name);
-    if [
-        "rosgraph_msgs/",
-        "rcl_interfaces/",
-        "tf2_msgs/",
-        "tf/",
-        "roslib/",
-        "bond/",
-    ]
-    .iter()
-    .any(|package| plain.starts_with(package))
-    {
+    let (package, _) = plain.split_once('/').unwrap_or_default();
+    if OF_ROS.split(' ').any(|own| own == package) {
         return None;
     }
     let known = match &*plain {
@@ -125,7 +117,7 @@ struct Echo {
 /// A node, the text before and after the value, a topic.
 type LogForm = (Name, String, String, Name);
 
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
     let (said, shown) = known.facts.logged.sorted();
     let echoes = echoes(known, &said, &shown);
     let mut by_node: Few<Name, Vec<&str>> = Few::default();
@@ -134,15 +126,12 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             by_node.grown(node).push(&text.text);
         }
     }
-    let enough = echoes
-        .iter()
-        .filter(|(_, echo)| echo.values.len() >= FEWEST);
-    let strong: Vec<_> = enough
-        .take(MOST_FORMS)
-        .filter(|((node, before, after, _), echo)| {
-            is_strong(echo, before, after, by_node.of(*node))
-        })
-        .collect();
+    let mut strong: Vec<_> = echoes.iter().collect();
+    strong.retain(|(_, echo)| echo.values.len() >= FEWEST);
+    strong.truncate(MOST_FORMS);
+    strong.retain(|((node, before, after, _), echo)| {
+        is_strong(echo, before, after, by_node.of(*node))
+    });
     for ((node, before, after, topic), echo) in &strong {
         let same = |other: &&(&LogForm, &Echo)| {
             let (n, b, a, _) = other.0;
@@ -152,8 +141,19 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         if strong.iter().filter(same).count() > 1 {
             continue;
         }
-        if let Some(what) = end(known, *node, *topic, before, after, echo) {
-            observe(source, known, what, (before, after), echo);
+        if let Some(what) = end(known, *node, *topic, before, after, echo)
+            && !known.knows(what)
+            && !known.denies(what)
+        {
+            let when = Validity::Signs {
+                signs: echo.texts.iter().map(|(time, _)| *time).collect(),
+                ends: Vec::new(),
+            };
+            let first = echo.texts.first().map(|(time, _)| *time);
+            known.because(what, Confidence::Stated, when, first, |_| {
+                let (texts, values) = (echo.texts.len(), echo.values.len());
+                format!("{texts} log texts `{before}…{after}` repeat {values} different messages")
+            });
         }
     }
 }
@@ -204,10 +204,8 @@ fn place(text: &str, value: &str) -> Option<Range<usize>> {
     let start = text.find(value)?;
     let end = start + value.len();
     let is_part = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
-    let (before, after) = (
-        text[..start].chars().next_back(),
-        text[end..].chars().next(),
-    );
+    let before = text[..start].chars().next_back();
+    let after = text[end..].chars().next();
     let more = is_number(value)
         && (matches!(before, Some('.' | '-'))
             || text[end..].starts_with('.')
@@ -230,10 +228,9 @@ fn is_strong(echo: &Echo, before: &str, after: &str, by_node: &[&str]) -> bool {
         return true;
     }
     let length = before.len() + after.len();
-    let form = by_node
-        .iter()
-        .filter(|text| text.len() >= length && text.starts_with(before) && text.ends_with(after));
-    echo.texts.len() * 100 >= form.count() * SHARE
+    let is_form =
+        |text: &&&str| text.len() >= length && text.starts_with(before) && text.ends_with(after);
+    echo.texts.len() * 100 >= by_node.iter().filter(is_form).count() * SHARE
 }
 
 /// Whether the words of a text mean a message sent (`true`) or received (`false`); `None` if neither or both.
@@ -255,11 +252,9 @@ fn end(
     echo: &Echo,
 ) -> Option<ElementKey> {
     let (all, first) = (echo.texts.len(), echo.first);
-    let (publish, subscribe) = (
-        ElementKey::Publish(node, topic),
-        ElementKey::Subscribe(topic, node),
-    );
-    if known.publishers(topic).any(|p| p == node) {
+    let publish = ElementKey::Publish(node, topic);
+    let subscribe = ElementKey::Subscribe(topic, node);
+    if known.knows(publish) {
         return None;
     }
     let later = first * 5 <= all;
@@ -274,28 +269,6 @@ fn end(
     }
 }
 
-fn observe(
-    source: SourceId,
-    known: &mut Conclusions<'_>,
-    what: ElementKey,
-    (before, after): (&str, &str),
-    echo: &Echo,
-) {
-    if known.knows(what) || known.denies(what) {
-        return;
-    }
-    let when = Validity::Signs {
-        signs: echo.texts.iter().map(|(time, _)| *time).collect(),
-        ends: Vec::new(),
-    };
-    let inference = Inference::new(source, what, Confidence::Stated, when);
-    let first = echo.texts.first().map(|(time, _)| *time);
-    known.because(inference, first, |_| {
-        let (texts, values) = (echo.texts.len(), echo.values.len());
-        format!("{texts} log texts `{before}…{after}` repeat {values} different messages")
-    });
-}
-
 // Texts that come with messages. For example, `/walker` logs `speed: 0.2` 24 times, numbers aside, and each time a message of
 // `/cmd_vel`, which has no others, follows within milliseconds: `/walker` publishes it.
 
@@ -307,7 +280,7 @@ const BESIDE_NS: i64 = 50_000_000;
 const FEWEST_BESIDE: usize = 10;
 const SHARES_BESIDE: [usize; 2] = [90, 80];
 
-pub(crate) fn conclude_beside(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude_beside(known: &mut Conclusions<'_>) {
     let (said, _) = known.facts.logged.sorted();
     let of = |text: &LoggedText| Some(((known.owner(&text.logger)?, form(&text.text)), text.time));
     let mut forms = grouped(said.iter().filter_map(of));
@@ -336,7 +309,7 @@ pub(crate) fn conclude_beside(source: SourceId, known: &mut Conclusions<'_>) {
             continue;
         };
         if is_first && known.publishers(topic).next().is_none() {
-            known.infer_publisher(source, *node, topic, |known| {
+            known.infer_publisher(*node, topic, |known| {
                 let [node, topic] = [*node, topic].map(|name| known.text(name));
                 format!(
                     "{} log texts of {node} come with messages of {topic}",

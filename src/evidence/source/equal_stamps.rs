@@ -15,7 +15,7 @@ use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::message::cursor::PayloadCursor;
 use crate::evidence::message::dynamic::MessageSchema;
-use crate::evidence::observation::{Name, Observation, ObservationRecord, SourceId};
+use crate::evidence::observation::{Name, Observation, ObservationRecord};
 use crate::evidence::source_id;
 use crate::evidence::spread::Spread;
 use crate::evidence::times::Timed;
@@ -140,26 +140,22 @@ struct Flows {
     pairs: BTreeMap<(usize, usize), StampPair>,
 }
 
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
     if is_simulated(known) {
         return;
     }
     let flows = flows(known);
     for (output, flow) in flows.all.iter().enumerate() {
-        let copied = flow
-            .nodes
-            .iter()
-            .any(|n| known.copies.contains(&(*n, flow.topic)));
-        if flow.nodes.is_empty() || copied {
+        let is_copy = |node: &Name| known.copies.contains(&(*node, flow.topic));
+        if flow.nodes.is_empty() || flow.nodes.iter().any(is_copy) {
             continue;
         }
-        let Some(input) = input(known, &flows, output) else {
+        let Some((topic, matches)) = input(known, &flows, output) else {
             continue;
         };
-        let (topic, matches) = input;
         for node in &flow.nodes {
             let basis = ElementKey::Publish(*node, flow.topic);
-            known.infer(source, ElementKey::Subscribe(topic, *node), basis, |known| {
+            known.infer(ElementKey::Subscribe(topic, *node), basis, |known| {
                 let [from, to] = [topic, flow.topic].map(|n| known.text(n));
                 let total = flow.messages;
                 format!(
@@ -186,9 +182,8 @@ fn input(known: &Conclusions<'_>, flows: &Flows, output: usize) -> Option<(Name,
     let mut topics: BTreeMap<Name, (usize, StampPair, u64)> = BTreeMap::new();
     for ((_, input), pair) in own {
         let back = flows.pairs.get(&(*input, output)).map_or(0, |p| p.before);
-        let of = topics
-            .entry(flows.all[*input].topic)
-            .or_insert((*input, StampPair::default(), 0));
+        let of = topics.entry(flows.all[*input].topic);
+        let of = of.or_insert((*input, StampPair::default(), 0));
         of.1.equal += pair.equal;
         of.1.before += pair.before;
         of.1.lag = of.1.lag.and(pair.lag);
@@ -201,18 +196,14 @@ fn input(known: &Conclusions<'_>, flows: &Flows, output: usize) -> Option<(Name,
             && pair.before * 100 >= pair.equal * ORDERED
             && back * 100 <= pair.equal * (100 - ORDERED)
             && can_feed(&flows.all[*input].kind, &flow.kind)
-            && !flow
-                .nodes
-                .iter()
-                .any(|n| known.knows(ElementKey::Publish(*n, *topic)))
+            && !known
+                .publishers(*topic)
+                .any(|node| flow.nodes.contains(&node))
     });
-    let good: Vec<(usize, StampPair)> = good.map(|(_, (input, pair, _))| (input, pair)).collect();
+    let mut good: Vec<_> = good.map(|(_, (input, pair, _))| (input, pair)).collect();
     let most = good.iter().map(|(_, pair)| pair.before).max()?;
-    let best: Vec<_> = good
-        .into_iter()
-        .filter(|(_, pair)| pair.before * 100 >= most * AS_GOOD)
-        .collect();
-    let best = without_siblings(flows, flow, best)?;
+    good.retain(|(_, pair)| pair.before * 100 >= most * AS_GOOD);
+    let best = without_siblings(flows, flow, good)?;
     let found = |(at, pair): &(usize, StampPair)| (flows.all[*at].topic, pair.before);
     if let [only] = &best[..] {
         return Some(found(only));
@@ -283,9 +274,8 @@ fn without_siblings(
     for family in families.into_values() {
         let kind = |(at, _): &&(usize, StampPair)| flows.all[*at].kind.as_str();
         let same = family.iter().filter(|f| kind(f) == output.kind);
-        let data = family
-            .iter()
-            .filter(|f| kind(f) != "sensor_msgs/CameraInfo");
+        let is_data = |f: &&_| kind(f) != "sensor_msgs/CameraInfo";
+        let data = family.iter().filter(is_data);
         let [same, data]: [Vec<_>; 2] = [same.copied().collect(), data.copied().collect()];
         match (&family[..], &same[..], &data[..]) {
             ([one], ..) | (_, [one], _) | (_, [], [one]) => left.push(*one),
@@ -303,10 +293,8 @@ fn flows(known: &mut Conclusions<'_>) -> Flows {
     let mut keys = Vec::new();
     for (at, id) in streams.iter().zip(&series) {
         let topic = known.streams[*at].topic;
-        let stream = &known.streams[*at];
-        let node = stream
-            .publisher
-            .or_else(|| known.only_publisher(stream.topic));
+        let publisher = known.streams[*at].publisher;
+        let node = publisher.or_else(|| known.only_publisher(topic));
         let role = node.map_or_else(String::new, |n| role(&known.text(n)));
         let key = (known.text(topic).to_string(), role.clone());
         let flow = pooled.entry(key.clone()).or_insert_with(|| StampFlow {
@@ -321,18 +309,14 @@ fn flows(known: &mut Conclusions<'_>) -> Flows {
         keys.push(key);
     }
     let order: Vec<_> = pooled.keys().cloned().collect();
-    let flow_at: Vec<usize> = keys
-        .iter()
-        .map(|key| order.binary_search(key).unwrap_or(0))
-        .collect();
+    let place = |key| order.binary_search(key).unwrap_or(0);
+    let flow_at: Vec<usize> = keys.iter().map(place).collect();
     let all: Vec<StampFlow> = pooled.into_values().collect();
     let mut pairs: BTreeMap<(usize, usize), StampPair> = BTreeMap::new();
     let mut group: Vec<(Timed, usize)> = Vec::new();
     let merged = known.facts.times.merge(&series, |timed| {
-        if group
-            .first()
-            .is_some_and(|(first, _)| first.time != timed.time)
-        {
+        let first = group.first().map(|(first, _)| first.time);
+        if first.is_some_and(|first| first != timed.time) {
             compare(&group, &all, &mut pairs);
             group.clear();
         }

@@ -73,14 +73,9 @@ fn parameter<'a>(payload: &mut PayloadCursor<'a>) -> PayloadResult<Parameter<'a>
     payload.i64()?;
     payload.f64()?;
     payload.skip_string()?;
-    for least in [1, 1] {
-        let count = payload.length(least)?;
-        payload.bytes(count)?;
-    }
-    for _ in 0..2 {
-        for _ in 0..payload.length(8)? {
-            payload.u64()?;
-        }
+    for size in [1, 1, 8, 8] {
+        let count = payload.length(size)?;
+        payload.numbers(count, size)?;
     }
     for _ in 0..payload.length(4)? {
         payload.skip_string()?;
@@ -201,6 +196,7 @@ pub(crate) fn read_service(
         _ => return Err(payload.wrong("a kind of event")),
     };
     let client = hex_of(client);
+    let words = || format!("{service}: {word}, client {client}");
     let of = context.stream.topic;
     if !service.contains("/_action/") {
         let kind = context.stream.connection.type_name.clone();
@@ -211,9 +207,7 @@ pub(crate) fn read_service(
             (Some(node), "request sent" | "reply received") => Observation::Publish(node, called),
             (Some(node), _) => Observation::Subscribe(node, called),
         };
-        context.observation(end, Confidence::Measured, || {
-            format!("{service}: {word}, client {client}")
-        });
+        context.observation(end, Confidence::Measured, words);
         if context.stream.publisher.is_none() {
             let client = context.name(&client);
             context.states(Observation::Calls(called, client), String::new);
@@ -221,7 +215,6 @@ pub(crate) fn read_service(
         let known = Observation::Type(called, kind);
         context.observation(known, Confidence::Measured, String::new);
     }
-    let words = || format!("{service}: {word}, client {client}");
     context.observation(Observation::Topic(of), Confidence::Measured, words);
     Ok(())
 }

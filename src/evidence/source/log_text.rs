@@ -9,10 +9,10 @@ use crate::base::name::{is_feedback, is_log, resolved};
 use crate::base::rhythm::{DISCOVERY_NS, FOUND_NS, REGISTRATION_NS};
 use crate::base::time::Stamp;
 use crate::evidence::inference::{
-    Conclusions, ElementKey, IncidentKind, Inference, Reliability, Stream, Validity, verb,
+    Conclusions, ElementKey, IncidentKind, Reliability, Stream, Validity, verb,
 };
-use crate::evidence::message::dynamic::{LogRecord, is_ros1_log};
-use crate::evidence::observation::{Confidence, Name, Observation, ObservationRecord, SourceId};
+use crate::evidence::message::dynamic::{LogRecord, full_name, is_ros1_log};
+use crate::evidence::observation::{Confidence, Name, Observation, ObservationRecord};
 use crate::evidence::source::{SHARED, SourceContext};
 use crate::evidence::source_id;
 
@@ -114,8 +114,8 @@ fn bridged(text: &str) -> Option<(bool, &str)> {
 }
 
 /// Adds edges only for topics of the bag: a text may mean a device or a file.
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
-    for (fact, signs, ends) in known.observations(source) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
+    for (fact, signs, ends) in known.observations() {
         let (logger, topic, publishes, policy) = match fact.observation {
             Observation::SaysPublish(logger, topic) => (logger, topic, true, None),
             Observation::SaysSubscribe(logger, topic) => (logger, topic, false, None),
@@ -137,14 +137,13 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         if let Some(policy) = policy {
             let starved = IncidentKind::Starved(known.text(policy));
             for time in signs {
-                known.incident(source, what, starved.clone(), time);
+                known.incident(what, starved.clone(), time);
             }
             continue;
         }
         let first = signs.first().copied();
         let when = Validity::Signs { signs, ends };
-        let inference = Inference::new(source, what, Confidence::Stated, when);
-        known.because(inference, first, |known| {
+        known.because(what, Confidence::Stated, when, first, |known| {
             let (logger, does) = (known.text(logger), verb(publishes));
             format!("{logger} logs that it {does} {full}")
         });
@@ -171,21 +170,16 @@ fn doubled(record: &LogRecord<'_>) -> Option<String> {
     }
     let rest = text.split_once("Publisher already registered for ")?.1;
     // Since Iron the text names the logger; the record's own is `rcl.logging_rosout`, or the node's.
-    let named = rest
-        .strip_prefix("node name: '")
-        .and_then(|rest| rest.split_once('\''));
-    match named {
-        Some((name, _)) => Some(format!(
-            "/{}",
-            name.trim_start_matches('/').replace('.', "/")
-        )),
+    let named = rest.strip_prefix("node name: '");
+    match named.and_then(|rest| rest.split_once('\'')) {
+        Some((name, _)) => Some(full_name(name)),
         None => Some(record.logger.clone()).filter(|name| !name.starts_with("/rcl/")),
     }
 }
 
 /// Adds the names that are used twice.
-pub(crate) fn conclude_duplicates(source: SourceId, known: &mut Conclusions<'_>) {
-    for fact in known.observed(source) {
+pub(crate) fn conclude_duplicates(known: &mut Conclusions<'_>) {
+    for fact in known.observed(known.source) {
         let Observation::Duplicate(name) = fact.observation else {
             continue;
         };
@@ -194,7 +188,7 @@ pub(crate) fn conclude_duplicates(source: SourceId, known: &mut Conclusions<'_>)
         };
         for time in known.times(&fact) {
             let what = ElementKey::Node(node);
-            known.incident(source, what, IncidentKind::Duplicate, time);
+            known.incident(what, IncidentKind::Duplicate, time);
         }
     }
 }
@@ -204,13 +198,11 @@ pub(crate) fn conclude_duplicates(source: SourceId, known: &mut Conclusions<'_>)
 
 /// The topic that a recorder, of ROS 1 or ROS 2, says that it has found.
 fn found_topic(text: &str) -> Option<&str> {
-    let of_ros2 = || {
-        text.strip_prefix("Subscribed to topic '")?
-            .strip_suffix('\'')
-    };
-    text.strip_prefix("Subscribing to ")
-        .map(str::trim)
-        .or_else(of_ros2)
+    if let Some(topic) = text.strip_prefix("Subscribing to ") {
+        return Some(topic.trim());
+    }
+    let quoted = text.strip_prefix("Subscribed to topic '")?;
+    quoted.strip_suffix('\'')
 }
 
 /// The topics that recorders found, each with the times.
@@ -242,10 +234,8 @@ fn births(known: &mut Conclusions<'_>) -> Vec<(Name, Stamp)> {
     }
     // One that is given a list of topics names all of them when it starts, and need not find any.
     let births = found.iter().filter_map(|(_, times)| times.first());
-    let is_list = births
-        .clone()
-        .min()
-        .is_none_or(|first| !births.clone().any(|time| is_later(*first, &time)));
+    let first = births.clone().min();
+    let is_list = first.is_none_or(|first| !births.clone().any(|time| is_later(*first, &time)));
     let start = known.mission.0;
     let birth = |(topic, times): (Name, Vec<Stamp>)| {
         let birth = times.first().copied().filter(|_| !is_list)?;
@@ -259,7 +249,7 @@ fn births(known: &mut Conclusions<'_>) -> Vec<(Name, Stamp)> {
 
 /// A topic began when the recorder found it, and so did the publications of the only node that publishes it, or of those that send at
 /// once. For example, `/manager`, `/crop` and `/resize` send to the topic of their bond within a second after it was found.
-pub(crate) fn conclude_births(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude_births(known: &mut Conclusions<'_>) {
     for (topic, birth) in births(known) {
         let streams = known.streams.iter().filter(|stream| stream.topic == topic);
         let is_whole = |stream: &Stream| stream.trust == Reliability::Whole;
@@ -270,8 +260,8 @@ pub(crate) fn conclude_births(source: SourceId, known: &mut Conclusions<'_>) {
         let publisher = |stream: &Stream| stream.publisher;
         let nodes: BTreeSet<Option<Name>> = streams.clone().map(publisher).collect();
         let is_there = |stream: &&Stream| {
-            let first = known.messages.and_then(|all| all.bounds(stream.times));
-            nodes.len() == 1 || first.is_some_and(|of| of.0.since(birth) <= FOUND_NS)
+            let bounds = known.bounds(stream);
+            nodes.len() == 1 || bounds.is_some_and(|(first, _)| first.since(birth) <= FOUND_NS)
         };
         let there: BTreeSet<_> = streams.filter(is_there).map(publisher).collect();
         for node in there {
@@ -280,8 +270,7 @@ pub(crate) fn conclude_births(source: SourceId, known: &mut Conclusions<'_>) {
                 None => ElementKey::Topic(topic),
             };
             let when = Validity::begin(birth);
-            let inference = Inference::new(source, what, Confidence::Stated, when);
-            known.because(inference, Some(birth), |known| {
+            known.because(what, Confidence::Stated, when, Some(birth), |known| {
                 format!("the recorder found {} then", known.text(topic))
             });
         }
@@ -292,7 +281,7 @@ pub(crate) fn conclude_births(source: SourceId, known: &mut Conclusions<'_>) {
 // long after the recorder has connected to what was there, and is not the node's first, has just started. For example, `/teleop`
 // first logs at 101.2 s, with number 2: it sent number 1 before the recorder was connected, and would otherwise have been there at 0 s.
 
-pub(crate) fn conclude_connected(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude_connected(known: &mut Conclusions<'_>) {
     let mut recordings = recordings(known);
     recordings.sort_unstable();
     let Some(&(whole, _)) = recordings.iter().find(|(_, is_whole)| *is_whole) else {
@@ -315,8 +304,7 @@ pub(crate) fn conclude_connected(source: SourceId, known: &mut Conclusions<'_>) 
         let is_connected = latest.is_some_and(|(start, _)| time.since(*start) > 2 * FOUND_NS);
         if whole <= time && is_connected {
             let (what, when) = (ElementKey::Node(node), Validity::begin(time));
-            let inference = Inference::new(source, what, Confidence::Stated, when);
-            known.because(inference, Some(time), |known| {
+            known.because(what, Confidence::Stated, when, Some(time), |known| {
                 let node = known.text(node);
                 format!("the recorder connected to the log of {node} then, after its first record")
             });
@@ -328,7 +316,7 @@ pub(crate) fn conclude_connected(source: SourceId, known: &mut Conclusions<'_>) 
 fn recordings(known: &mut Conclusions<'_>) -> Vec<(Stamp, bool)> {
     let found: BTreeMap<Name, Vec<Stamp>> = found(known).into_iter().collect();
     let first = |stream: &Stream| {
-        let (first, _) = known.messages?.bounds(stream.times)?;
+        let (first, _) = known.bounds(stream)?;
         Some((stream.bag, (first, stream.topic)))
     };
     let bags = grouped(known.streams.iter().filter_map(first));
@@ -352,7 +340,7 @@ fn recordings(known: &mut Conclusions<'_>) -> Vec<(Stamp, bool)> {
 // A topic that the recorder finds while a single node starts is of that node. For example, `/teleop` declares its parameters at
 // 101.0 s, the recorder finds `/teleop/cmd_vel` at 101.6 s, and no other node starts then.
 
-pub(crate) fn conclude_found(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude_found(known: &mut Conclusions<'_>) {
     let mut starts: Vec<(Stamp, Name)> = Vec::new();
     for fact in known.observed(source_id("parameter_events")) {
         if let Observation::Begins(node) = fact.observation {
@@ -370,7 +358,7 @@ pub(crate) fn conclude_found(source: SourceId, known: &mut Conclusions<'_>) {
         let is_of_any = is_feedback(&name) || SHARED.contains(&&*name);
         let is_known = is_of_any || known.publishers(topic).next().is_some();
         if let (Some(node), 1, false) = (nodes.first(), nodes.len(), is_known) {
-            known.infer_publisher(source, *node, topic, |known| {
+            known.infer_publisher(*node, topic, |known| {
                 let node = known.text(*node);
                 format!("the recorder found {name} when {node} started, and no other node")
             });

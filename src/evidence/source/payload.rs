@@ -17,7 +17,7 @@ use crate::base::name::LOGS;
 use crate::base::rhythm::FEWEST_OF_SENDER;
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
-use crate::evidence::observation::{Name, SourceId};
+use crate::evidence::observation::Name;
 use crate::evidence::source::SourceContext;
 use crate::evidence::spread::Spread;
 
@@ -85,7 +85,7 @@ struct Matches {
     runs: ById<usize, Vec<Run>>,
 }
 
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
     let (flows, matches) = matches(known);
     for (output, total) in matches.distinct.with_ids().filter(|(_, total)| **total > 0) {
         let (basis, sender) = flows[output];
@@ -99,11 +99,11 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         }
         known.copies.insert((node, basis));
         let inputs = nearest(&matches, output, &inputs);
-        switches(source, known, &flows, &matches, (output, &inputs));
+        switches(known, &flows, &matches, (output, &inputs));
         for input in inputs {
             let topic = flows[input].0;
             let what = ElementKey::Subscribe(topic, node);
-            known.infer(source, what, ElementKey::Publish(node, basis), |known| {
+            known.infer(what, ElementKey::Publish(node, basis), |known| {
                 let count = matches.pairs[&(input, output)].before;
                 let [from, to] = [topic, basis].map(|n| known.text(n));
                 format!(
@@ -116,7 +116,6 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
 
 /// Adds the times at which a mux switches to another of its inputs.
 fn switches(
-    source: SourceId,
     known: &mut Conclusions<'_>,
     flows: &[PayloadFlow],
     matches: &Matches,
@@ -126,13 +125,10 @@ fn switches(
     let runs: Vec<&Run> = runs
         .filter(|run| run.count >= FEWEST_OF_SENDER && inputs.contains(&run.input))
         .collect();
-    for pair in runs
-        .windows(2)
-        .filter(|pair| pair[0].input != pair[1].input)
-    {
+    for pair in runs.windows(2).filter(|two| two[0].input != two[1].input) {
         let [from, to] = [pair[0], pair[1]].map(|run| flows[run.input].0);
         let what = ElementKey::Topic(flows[output].0);
-        known.incident(source, what, IncidentKind::Switch(from, to), pair[1].first);
+        known.incident(what, IncidentKind::Switch(from, to), pair[1].first);
     }
 }
 
@@ -151,18 +147,12 @@ fn matches(known: &mut Conclusions<'_>) -> (Vec<PayloadFlow>, Matches) {
     });
     let (places, series): (Vec<usize>, Vec<_>) = kept.unzip();
     let flow_of = |at: &usize| (known.streams[*at].topic, known.streams[*at].publisher);
-    let named: BTreeMap<_, PayloadFlow> = places
-        .iter()
-        .map(|at| {
-            (
-                (
-                    known.text(flow_of(at).0),
-                    flow_of(at).1.map(|n| known.text(n)),
-                ),
-                flow_of(at),
-            )
-        })
-        .collect();
+    let named = places.iter().map(|at| {
+        let (topic, node) = flow_of(at);
+        let names = (known.text(topic), node.map(|node| known.text(node)));
+        (names, (topic, node))
+    });
+    let named: BTreeMap<_, PayloadFlow> = named.collect();
     let flows: Vec<PayloadFlow> = named.into_values().collect();
     let rank: BTreeMap<PayloadFlow, usize> = flows.iter().copied().zip(0..).collect();
     let flow_at: Vec<usize> = places.iter().map(|at| rank[&flow_of(at)]).collect();
@@ -208,12 +198,10 @@ impl PayloadWalk {
         if owners.len() >= MOST_AT_ONCE {
             return;
         }
-        for (_, other) in owners.iter().filter(|(t, f)| *t < time && *f != flow) {
-            let later = self.found.later.grown(*other);
-            *later.entry(flow).or_default() += 1;
-        }
         let mut origins = Vec::new();
         for (before, input) in owners.iter().filter(|(t, f)| *t < time && *f != flow) {
+            let later = self.found.later.grown(*input);
+            *later.entry(flow).or_default() += 1;
             let pair = self.found.pairs.entry((*input, flow)).or_default();
             pair.before += 1;
             pair.lag.add(time.since(*before) as f64 / 1e9);
@@ -279,10 +267,9 @@ fn copied(matches: &Matches, output: usize, inputs: &[usize]) -> u64 {
     let before = origins.filter(|(from, _)| from.iter().any(|f| inputs.contains(f)));
     let later = matches.later.get(output).into_iter().flatten();
     let later = later.filter(|(input, _)| inputs.contains(input));
-    let all = before
-        .map(|(_, count)| count)
-        .chain(later.map(|(_, count)| count));
-    all.sum::<u64>().min(matches.distinct[output])
+    let before: u64 = before.map(|(_, count)| count).sum();
+    let later: u64 = later.map(|(_, count)| count).sum();
+    (before + later).min(matches.distinct[output])
 }
 
 /// The nearer of two inputs with the same messages, which are on one path: the one whose lag clearly varies
@@ -297,11 +284,8 @@ fn nearest(matches: &Matches, output: usize, inputs: &[usize]) -> Vec<usize> {
     let is_path = |a, b| together(a, b) * 2 >= pair(a).before.min(pair(b).before);
     let beats = |a: usize, b: usize| pair(a).lag.is_clearly_less(&pair(b).lag);
     let rivals = |a: usize| inputs.iter().copied().filter(move |b| *b != a);
-    inputs
-        .iter()
-        .copied()
-        .filter(|a| rivals(*a).all(|b| !is_path(*a, b) || beats(*a, b)))
-        .collect()
+    let is_nearest = |a: &usize| rivals(*a).all(|b| !is_path(*a, b) || beats(*a, b));
+    inputs.iter().copied().filter(is_nearest).collect()
 }
 
 // The choice that a mux reports on `<mux>/selected`: it subscribes to that topic and forwards it from then on.
@@ -309,7 +293,7 @@ fn nearest(matches: &Matches, output: usize, inputs: &[usize]) -> Vec<usize> {
 /// The name of the topic below that of the mux.
 const SELECTED: &str = "/selected";
 
-pub(crate) fn conclude_selected(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude_selected(known: &mut Conclusions<'_>) {
     let is_report = |topic: &Name| known.text(*topic).ends_with(SELECTED);
     let reports = known.topics_of(|kind| kind == "std_msgs/String");
     let reports: Vec<Name> = reports.into_iter().filter(is_report).collect();
@@ -325,48 +309,30 @@ pub(crate) fn conclude_selected(source: SourceId, known: &mut Conclusions<'_>) {
         };
         let of_report = shown
             .iter()
-            .filter(|value| known.streams[value.stream].topic == report);
-        let chosen =
-            of_report.filter_map(|value| Some((value.time, known.facts.known(&value.value)?)));
+            .filter(|of| known.streams[of.stream].topic == report);
+        let chosen = of_report.filter_map(|of| Some((of.time, known.facts.known(&of.value)?)));
         let chosen: Vec<(Stamp, Name)> = chosen.collect();
-        for output in outputs(known, node) {
-            select(source, known, (node, output), &chosen);
+        let is_output = |(of, topic): &(Name, Name)| *of == node && known.is_recorded(*topic);
+        let outputs: Vec<_> = known.publications().filter(is_output).collect();
+        for (_, output) in outputs {
+            select(known, (node, output), &chosen);
         }
     }
 }
 
-/// The topics that a node publishes besides its reports and its log.
-fn outputs(known: &Conclusions<'_>, node: Name) -> Vec<Name> {
-    let own = known.publications().filter(|(of, _)| *of == node);
-    let topics = own.map(|(_, topic)| topic);
-    let is_recorded = |topic: &Name| known.is_recorded(*topic);
-    topics.filter(is_recorded).collect()
-}
-
 /// Adds the inputs of a mux that have the type of its output, and the times at which it switches from one to
 /// another.
-fn select(
-    source: SourceId,
-    known: &mut Conclusions<'_>,
-    (node, output): (Name, Name),
-    chosen: &[(Stamp, Name)],
-) {
+fn select(known: &mut Conclusions<'_>, (node, output): (Name, Name), chosen: &[(Stamp, Name)]) {
     let kind = known.kind(output);
     let is_input =
         |topic: Name| topic != output && known.is_recorded(topic) && known.kind(topic) == kind;
-    let inputs: Vec<(Stamp, Name)> = chosen
-        .iter()
-        .copied()
-        .filter(|(_, t)| is_input(*t))
-        .collect();
+    let mut inputs = chosen.to_vec();
+    inputs.retain(|(_, topic)| is_input(*topic));
     for (_, input) in &inputs {
         let what = ElementKey::Subscribe(*input, node);
-        known.infer(source, what, ElementKey::Publish(node, output), |known| {
-            format!(
-                "{} reports that it forwards {}",
-                known.text(node),
-                known.text(*input)
-            )
+        known.infer(what, ElementKey::Publish(node, output), |known| {
+            let [node, input] = [node, *input].map(|name| known.text(name));
+            format!("{node} reports that it forwards {input}")
         });
     }
     let what = ElementKey::Topic(output);
@@ -375,7 +341,7 @@ fn select(
     }
     for pair in inputs.windows(2).filter(|pair| pair[0].1 != pair[1].1) {
         let switch = IncidentKind::Switch(pair[0].1, pair[1].1);
-        known.incident(source, what, switch, pair[1].0);
+        known.incident(what, switch, pair[1].0);
     }
 }
 

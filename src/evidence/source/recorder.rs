@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use crate::base::ids::Few;
 use crate::base::name::is_recorder;
 use crate::base::time::Stamp;
-use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind, Inference, Validity};
+use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::dynamic::{LogRecord, MessageLayout};
-use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
+use crate::evidence::observation::{Confidence, Name, Observation};
 use crate::evidence::source::SourceContext;
 
 /// The ends of the recorder's source paths: of `rosbag` and of `rosbag2_transport`.
@@ -26,9 +26,9 @@ pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
 }
 
 /// Adds the subscriptions of the recorder: a single one among the nodes wrote the bag; several cannot be distinguished.
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
-    let stated = known.facts.list.iter().filter(|fact| fact.source == source);
-    let stated = stated.filter_map(|fact| match fact.observation {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
+    let observed = known.observed(known.source).into_iter();
+    let stated = observed.filter_map(|fact| match fact.observation {
         Observation::Node(node) => Some(node),
         _ => None,
     });
@@ -37,8 +37,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let recorders: BTreeSet<Name> = stated.chain(named).collect();
     for recorder in &recorders {
         let what = ElementKey::Node(*recorder);
-        let when = Validity::Unending;
-        known.add(Inference::new(source, what, Confidence::Stated, when));
+        known.add(what, Confidence::Stated, Validity::Unending);
     }
     if recorders.len() != 1 {
         return;
@@ -48,7 +47,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         for topic in &topics {
             let what = ElementKey::Subscribe(*topic, recorder);
             let when = Validity::Like(ElementKey::Topic(*topic));
-            known.add(Inference::new(source, what, Confidence::Stated, when));
+            known.add(what, Confidence::Stated, when);
         }
     }
 }
@@ -84,7 +83,7 @@ pub(crate) fn read_lost(
 }
 
 /// Adds the losses; consecutive reports are combined.
-pub(crate) fn conclude_lost(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude_lost(known: &mut Conclusions<'_>) {
     let mut lost: Few<Name, Vec<(Stamp, u64)>> = Few::default();
     for fact in known.facts.list.clone() {
         if let Observation::Lost(topic, many) = fact.observation
@@ -101,7 +100,7 @@ pub(crate) fn conclude_lost(source: SourceId, known: &mut Conclusions<'_>) {
     for (topic, reports) in lost.with_ids() {
         for (time, many) in reports {
             let what = ElementKey::Topic(topic);
-            known.incident(source, what, IncidentKind::Lost(*many), *time);
+            known.incident(what, IncidentKind::Lost(*many), *time);
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::base::digest::hex_of;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind, verb};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::dynamic::{MessageLayout, MessageSchema, MessageValue};
-use crate::evidence::observation::{Name, Observation, SourceId};
+use crate::evidence::observation::{Name, Observation};
 
 /// `rosgraph_msgs/msg/Graph`.
 pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2("rosgraph_msgs/Graph", "");
@@ -74,18 +74,13 @@ fn parsed(
         Some(form.with(MessageSchema::of_text(DEFINITION)))
     });
     let all: Vec<MessageSchema> = own.into_iter().chain(forms).collect();
-    let whole = all
-        .iter()
-        .find_map(|schema| schema.read(&mut payload.clone()).ok());
+    let whole = |schema: &MessageSchema| schema.read(&mut payload.clone()).ok();
     // Some serializers reserve more bytes than they write, such as that of `rmw_fastrtps` for messages that
     // programs write to a bag themselves.
-    let begun = || {
-        let mut begun = all
-            .iter()
-            .filter_map(|schema| schema.read_begun(&mut payload.clone()).ok());
-        begun.find(is_sound)
-    };
-    whole.or_else(begun).ok_or(payload.wrong("a graph"))
+    let begun = |schema: &MessageSchema| schema.read_begun(&mut payload.clone()).ok();
+    let value = all.iter().find_map(whole);
+    let value = value.or_else(|| all.iter().filter_map(begun).find(is_sound));
+    value.ok_or(payload.wrong("a graph"))
 }
 
 /// Whether every node has a valid ROS name, unlike random bytes.
@@ -129,9 +124,8 @@ fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
             let observation = Observation::edge(is_sent, id, of);
             let quality = qos.and_then(quality);
             context.states_in(group, observation, || {
-                let quality = quality
-                    .as_ref()
-                    .map_or_else(String::new, |q| format!(" ({q})"));
+                let quality = quality.as_ref().map(|quality| format!(" ({quality})"));
+                let quality = quality.unwrap_or_default();
                 format!("{name} {} {topic}{quality}", verb(is_sent))
             });
             if let Some(quality) = quality.filter(|_| is_sent) {
@@ -190,15 +184,11 @@ fn ends(node: &MessageValue) -> Vec<MessageEnd<'_>> {
     for (field, is_sent) in [("action_servers", true), ("action_clients", false)] {
         for action in node.list(field) {
             for part in ["feedback", "status"] {
-                let unnamed = || {
+                let named = action.field(part).map(|end| topic(end, is_sent));
+                all.push(named.unwrap_or_else(|| {
                     let name = format!("{}/_action/{part}", action.text("name"));
                     (is_sent, name.into(), "", None)
-                };
-                all.push(
-                    action
-                        .field(part)
-                        .map_or_else(unnamed, |end| topic(end, is_sent)),
-                );
+                }));
             }
         }
     }
@@ -231,10 +221,8 @@ fn quality(qos: &MessageValue) -> Option<String> {
         Some(MessageValue::Byte(value @ 1..=2)) => Some(words[usize::from(*value) - 1]),
         _ => None,
     };
-    let history = match (
-        word("history", ["keep_last", "keep_all"]),
-        qos.field("depth"),
-    ) {
+    let history = word("history", ["keep_last", "keep_all"]);
+    let history = match (history, qos.field("depth")) {
         (Some("keep_last"), Some(MessageValue::Number(Some(depth)))) => format!(" depth {depth}"),
         (Some("keep_all"), _) => " keep_all".to_owned(),
         _ => String::new(),
@@ -259,16 +247,11 @@ fn parameters(node: &MessageValue) -> String {
         (MessageValue::Byte(4), value) => Some(value.text("string_value").to_owned()),
         _ => None,
     };
-    let all = node
-        .list("parameters")
-        .iter()
-        .zip(values)
-        .map(|(parameter, value)| {
-            let value = value
-                .and_then(word)
-                .map_or_else(String::new, |word| format!(" = {word}"));
-            format!("{}{value}", parameter.text("name"))
-        });
+    let all = node.list("parameters").iter().zip(values);
+    let all = all.map(|(parameter, value)| {
+        let value = value.and_then(word).map(|word| format!(" = {word}"));
+        format!("{}{}", parameter.text("name"), value.unwrap_or_default())
+    });
     let all: Vec<String> = all.collect();
     match all.len() {
         0 => String::new(),
@@ -303,8 +286,8 @@ fn incompatible(offered: &MessageValue, asked: &MessageValue) -> Option<&'static
 }
 
 /// Adds the subscribers that receive nothing, and duplicate names.
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
-    for fact in known.observed(source) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
+    for fact in known.observed(known.source) {
         let (what, kind) = match fact.observation {
             Observation::Starved(node, topic, policy) => (
                 ElementKey::Subscribe(topic, node),
@@ -315,7 +298,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         };
         // Each snapshot repeats it.
         if let Some(time) = known.times(&fact).first() {
-            known.incident(source, what, kind, *time);
+            known.incident(what, kind, *time);
         }
     }
 }

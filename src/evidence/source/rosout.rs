@@ -8,9 +8,9 @@ use std::sync::Arc;
 
 use crate::base::name::{LOGS, in_space, is_log, is_player, role, with_spaces};
 use crate::base::rhythm::FIRST_RECORD;
-use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
+use crate::evidence::inference::{Conclusions, ElementKey, Reliability, Validity};
 use crate::evidence::message::dynamic::LogRecord;
-use crate::evidence::observation::{Confidence, Name, Observation, Observations, SourceId};
+use crate::evidence::observation::{Confidence, Name, Observation, Observations};
 use crate::evidence::source::SourceContext;
 
 pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
@@ -84,9 +84,9 @@ fn list(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
 
 /// A topic in a rospy node's list that it is known to publish is a publication; one that others publish, or that nobody
 /// advertises, is a subscription.
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
     let unadvertised = unadvertised(known);
-    for (fact, signs, ends) in known.observations(source) {
+    for (fact, signs, ends) in known.observations() {
         let Observation::Lists(node, topic) = fact.observation else {
             continue;
         };
@@ -101,13 +101,13 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             (false, false) => continue,
         };
         // If headers do not name all publishers, a node that names a topic may be one of them.
-        let confidence = if is_reported(known, topic) {
+        let confidence = if known.is_reported(topic) {
             Confidence::Stated
         } else {
             Confidence::Inferred
         };
         let when = Validity::Signs { signs, ends };
-        known.add(Inference::new(source, what, confidence, when));
+        known.add(what, confidence, when);
     }
 }
 
@@ -121,27 +121,20 @@ fn is_of_all(known: &Conclusions<'_>, topic: Name) -> bool {
 /// The topics that every node of ROS 1 may publish.
 const OF_ALL: [&str; 2] = ["/rosout", "/statistics"];
 
-/// Whether headers name all publishers of a topic.
-fn is_reported(known: &Conclusions<'_>, topic: Name) -> bool {
-    let mut of_topic = known.streams.iter().filter(|s| s.topic == topic);
-    known.is_recorded(topic)
-        && of_topic.all(|s| s.publisher.is_some() && s.trust == Reliability::Whole)
-}
-
 /// Whether a node that differs only in an anonymous suffix publishes a topic whose headers do not name all publishers.
 fn has_twin(known: &Conclusions<'_>, node: Name, topic: Name) -> bool {
     let own = known.text(node);
     let base = role(&own);
     let mut publishers = known.publishers(topic);
     base.len() < own.len()
-        && !is_reported(known, topic)
+        && !known.is_reported(topic)
         && publishers.any(|p| role(&known.text(p)) == base)
 }
 
 /// Whether a node that names `/tf` as its own publishes it rather than subscribes to it: a tf2 listener also
 /// names `/tf_static`. Used only if headers do not name all publishers.
 fn is_broadcaster(known: &Conclusions<'_>, node: Name, topic: Name) -> bool {
-    let stated = is_reported(known, topic);
+    let stated = known.is_reported(topic);
     let text = known.text(topic);
     let twin = match text.strip_suffix("/tf_static") {
         Some(space) => format!("{space}/tf"),
@@ -150,10 +143,9 @@ fn is_broadcaster(known: &Conclusions<'_>, node: Name, topic: Name) -> bool {
     };
     let twin = known.facts.known(&twin);
     let names = |twin| {
-        let facts = known.facts.list.iter();
-        facts
-            .map(|f| f.observation)
-            .any(|c| c == Observation::Lists(node, twin))
+        let listed = Observation::Lists(node, twin);
+        let mut facts = known.facts.list.iter();
+        facts.any(|fact| fact.observation == listed)
     };
     !stated && !twin.is_some_and(names)
 }
@@ -212,14 +204,12 @@ pub(crate) fn read_ros2(context: &mut SourceContext<'_>, record: &LogRecord<'_>)
 }
 
 /// A logger is a part of the nearest node or logger above it, and a node if there is none; the node publishes the log.
-pub(crate) fn conclude_ros2(source: SourceId, known: &mut Conclusions<'_>) {
-    let observations = known.observations(source);
-    let loggers = observations
-        .iter()
-        .filter_map(|(fact, signs, _)| match fact.observation {
-            Observation::Logger(name, topic) => Some((known.text(name), topic, signs.clone())),
-            _ => None,
-        });
+pub(crate) fn conclude_ros2(known: &mut Conclusions<'_>) {
+    let observations = known.observations().into_iter();
+    let loggers = observations.filter_map(|(fact, signs, _)| match fact.observation {
+        Observation::Logger(name, topic) => Some((known.text(name), topic, signs)),
+        _ => None,
+    });
     let mut loggers: Vec<_> = loggers.collect();
     loggers.sort_by(|a, b| a.0.cmp(&b.0));
     let mut nodes: BTreeSet<Arc<str>> = known.nodes().iter().map(|n| known.text(*n)).collect();
@@ -231,13 +221,11 @@ pub(crate) fn conclude_ros2(source: SourceId, known: &mut Conclusions<'_>) {
             signs,
             ends: Vec::new(),
         };
-        let is_generated = generated(&logger) == Some(node);
-        let confidence = if is_generated {
-            Confidence::Inferred
-        } else {
-            Confidence::Stated
+        let confidence = match generated(&logger) {
+            Some(above) if above == node => Confidence::Inferred,
+            _ => Confidence::Stated,
         };
-        known.add(Inference::new(source, what, confidence, when));
+        known.add(what, confidence, when);
     }
 }
 
@@ -272,18 +260,18 @@ fn owner<'a>(logger: &'a str, nodes: &BTreeSet<Arc<str>>) -> &'a str {
 // Every node of ROS 1 publishes `/rosout`, mostly silently; the node `/rosout` subscribes to it and publishes
 // `/rosout_agg`.
 
-pub(crate) fn conclude_rule(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude_rule(known: &mut Conclusions<'_>) {
     if !known.is_ros1() || known.nodes().is_empty() {
         return;
     }
     // Each recording in a namespace has its own master.
     for space in known.facts.spaces.clone() {
-        add_rule(source, known, &space);
+        add_rule(known, &space);
     }
 }
 
 /// Adds the log of the nodes whose recording lies in a namespace.
-fn add_rule(source: SourceId, known: &mut Conclusions<'_>, space: &str) {
+fn add_rule(known: &mut Conclusions<'_>, space: &str) {
     let own = |node: &str| {
         let spaces = known.facts.spaces.iter().map(String::as_str);
         let around = spaces.filter(|of| !of.is_empty() && in_space(of, node) == node);
@@ -292,16 +280,18 @@ fn add_rule(source: SourceId, known: &mut Conclusions<'_>, space: &str) {
     let nodes = known.nodes().iter().copied();
     let nodes: Vec<Name> = nodes.filter(|node| own(&known.text(*node))).collect();
     let [log, all] = LOGS.map(|name| known.facts.name(&in_space(space, name)));
-    let rule = |what, when| Inference::new(source, what, Confidence::Inferred, when);
-    for node in nodes {
-        if node != log {
-            let when = Validity::Like(ElementKey::Node(node));
-            known.add(rule(ElementKey::Publish(node, log), when));
-        }
+    for node in nodes.into_iter().filter(|node| *node != log) {
+        let when = Validity::Like(ElementKey::Node(node));
+        known.add(ElementKey::Publish(node, log), Confidence::Inferred, when);
     }
-    known.add(rule(ElementKey::Node(log), Validity::Always));
-    known.add(rule(ElementKey::Publish(log, all), Validity::Always));
-    known.add(rule(ElementKey::Subscribe(log, log), Validity::Always));
+    let own = [
+        ElementKey::Node(log),
+        ElementKey::Publish(log, all),
+        ElementKey::Subscribe(log, log),
+    ];
+    for what in own {
+        known.add(what, Confidence::Inferred, Validity::Always);
+    }
 }
 
 #[cfg(test)]

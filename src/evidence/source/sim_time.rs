@@ -9,7 +9,7 @@ use crate::evidence::inference::{Conclusions, ElementKey, Reliability};
 use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
 use crate::evidence::message::dynamic::MessageLayout;
 use crate::evidence::numbers::Number;
-use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
+use crate::evidence::observation::{Confidence, Name, Observation};
 use crate::evidence::source::{ParameterEvent, SourceContext};
 
 /// `rosgraph_msgs/Clock`.
@@ -52,7 +52,7 @@ pub(crate) fn stamped(context: &mut SourceContext<'_>, payload: &[u8]) {
 }
 
 /// A node of ROS 1 whose stamps are in simulated time subscribes to `/clock`: it reads the time nowhere else.
-pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
     let Some(clock) = known.facts.known("/clock") else {
         return;
     };
@@ -66,7 +66,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     }
     for (node, many) in of.into_iter().filter(|(_, many)| *many >= FEWEST) {
         let what = ElementKey::Subscribe(clock, node);
-        known.infer(source, what, ElementKey::Node(node), |known| {
+        known.infer(what, ElementKey::Node(node), |known| {
             let node = known.text(node);
             format!("{many} messages of {node} have stamps in the simulated time of /clock")
         });
@@ -80,17 +80,13 @@ pub(crate) fn read_parameters(context: &mut SourceContext<'_>, event: &Parameter
         return;
     };
     let (node, clock) = (context.name(event.node), context.name("/clock"));
-    let observation = if simulated {
-        Observation::Subscribe(node, clock)
+    let (observation, then) = if simulated {
+        (Observation::Subscribe(node, clock), "")
     } else {
-        Observation::Unsubscribe(node, clock)
+        let then = ", so it does not subscribe to /clock";
+        (Observation::Unsubscribe(node, clock), then)
     };
     context.observation(observation, Confidence::Inferred, || {
-        let then = if simulated {
-            ""
-        } else {
-            ", so it does not subscribe to /clock"
-        };
         format!("{} sets use_sim_time to {simulated}{then}", event.node)
     });
 }

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 
 use crate::base::cast;
 use crate::base::time::{Span, Stamp};
-use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
+use crate::evidence::inference::{Conclusions, ElementKey, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::dynamic::MessageLayout;
-use crate::evidence::observation::{Confidence, Measurement, Name, Observation, SourceId};
+use crate::evidence::observation::{Confidence, Measurement, Name, Observation};
 use crate::evidence::source::SourceContext;
 
 /// `rosgraph_msgs/TopicStatistics`.
@@ -120,15 +120,13 @@ pub(crate) fn read_monitor(
     }
     for ((topic, node, is_sent), [(periods, period), (ages, age)]) in ends {
         let nanos = i64::try_from(periods).map_or(0, |many| period.saturating_mul(many));
+        // Without periods: the collector reports once a second.
+        let length = if nanos > 0 { nanos } else { 1_000_000_000 };
         context.measure(Measurement {
             topic: Some(topic),
             publisher: Some(node).filter(|_| is_sent),
             subscriber: Some(node).filter(|_| !is_sent),
-            // Without periods: the collector reports once a second.
-            span: Span::new(
-                Stamp(0),
-                Stamp(if nanos > 0 { nanos } else { 1_000_000_000 }),
-            ),
+            span: Span::new(Stamp(0), Stamp(length)),
             is_rolling: true,
             delivered: Some(periods).filter(|_| nanos > 0),
             count: ages,
@@ -194,18 +192,18 @@ pub(crate) fn read_metrics(
 }
 
 /// Adds the publications of the nodes named in metrics, whose names lack the namespace.
-pub(crate) fn conclude_metrics(source: SourceId, known: &mut Conclusions<'_>) {
+pub(crate) fn conclude_metrics(known: &mut Conclusions<'_>) {
     let mut measured = std::mem::take(&mut known.facts.measured);
     for one in measured.iter_mut().filter(|one| one.topic.is_none()) {
         one.subscriber = one.subscriber.map(|node| known.meant(node));
     }
     known.facts.measured = measured;
-    for (fact, signs, ends) in known.observations(source) {
+    for (fact, signs, ends) in known.observations() {
         if let Observation::Reports(node, topic) = fact.observation {
             let node = known.meant(node);
             let what = ElementKey::Publish(node, topic);
             let when = Validity::Signs { signs, ends };
-            known.add(Inference::new(source, what, fact.confidence, when));
+            known.add(what, fact.confidence, when);
         }
     }
 }

@@ -110,23 +110,20 @@ fn tree(name: &str, given: &Arguments) -> Option<Tree> {
         other if OTHER.split(' ').any(|name| name == other) => element("other", &[]),
         _ => return None,
     };
-    match name {
-        "GroupAction" => tree.children = children(0, "actions"),
-        "TimerAction" => tree.children = children(9, "actions"),
+    tree.children.extend(match name {
+        "GroupAction" => children(0, "actions"),
+        "TimerAction" => children(9, "actions"),
         "ComposableNodeContainer" | "LoadComposableNodes" => {
-            tree.children
-                .extend(children(9, "composable_node_descriptions"));
+            children(9, "composable_node_descriptions")
         }
-        "RegisterEventHandler" => tree.children = children(0, "event_handler"),
+        "RegisterEventHandler" => children(0, "event_handler"),
         name if name.starts_with("On") => {
             let handlers = ["on_exit", "on_start", "on_completion", "entities"];
-            tree.children = handlers
-                .into_iter()
-                .flat_map(|name| children(usize::MAX, name))
-                .collect();
+            let children = handlers.map(|name| children(usize::MAX, name));
+            children.into_iter().flatten().collect()
         }
-        _ => {}
-    }
+        _ => Vec::new(),
+    });
     Some(tree)
 }
 
@@ -166,10 +163,9 @@ fn include(given: &Arguments) -> Tree {
     let passed = match given.get(1, "launch_arguments") {
         Some(List(pairs)) => pairs.clone(),
         Some(Dict(map)) => {
-            let pairs = map.iter();
-            pairs
-                .map(|(key, value)| List(vec![Text(key.clone()), value.clone()]))
-                .collect()
+            let pair =
+                |(key, value): &(String, PythonValue)| List(vec![Text(key.clone()), value.clone()]);
+            map.iter().map(pair).collect()
         }
         _ => Vec::new(),
     };
@@ -181,15 +177,11 @@ fn include(given: &Arguments) -> Tree {
 
 /// An element for each pair in a list, with its parts as these attributes.
 fn pairs(tag: &str, [first, second]: [&str; 2], list: &[PythonValue]) -> Vec<Tree> {
-    let one = |pair: &PythonValue| match pair {
-        List(pair) => match &pair[..] {
-            [a, b] => {
-                let (a, b) = (a.launch_text(), b.launch_text());
-                Some(element(tag, &[(first, Some(a)), (second, Some(b))]))
-            }
-            _ => None,
-        },
-        _ => None,
+    let one = |pair: &PythonValue| {
+        let List(pair) = pair else { return None };
+        let [a, b] = &pair[..] else { return None };
+        let (a, b) = (a.launch_text(), b.launch_text());
+        Some(element(tag, &[(first, Some(a)), (second, Some(b))]))
     };
     list.iter().filter_map(one).collect()
 }
@@ -200,12 +192,10 @@ fn unscoped() -> Tree {
 }
 
 fn element(tag: &str, attributes: &[(&str, Option<String>)]) -> Tree {
-    let known = attributes
-        .iter()
-        .filter_map(|(name, value)| Some(((*name).to_owned(), value.clone()?)));
+    let known = |(name, value): &(&str, Option<String>)| Some(((*name).to_owned(), value.clone()?));
     Tree {
         tag: tag.to_owned(),
-        attributes: known.collect(),
+        attributes: attributes.iter().filter_map(known).collect(),
         ..Tree::default()
     }
 }
