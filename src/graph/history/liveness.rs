@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
-use crate::base::ids::Few;
+use crate::base::ids::grouped;
 use crate::base::name::{is_feedback, is_log, lies_in, role, start};
 use crate::base::rhythm::{CROWD_NS, FOUND_NS, TOGETHER_NS, broken_after};
 use crate::base::time::{Span, Stamp};
@@ -334,11 +334,11 @@ pub(crate) fn fall_silent(
     findings: &Findings,
     pauses: &[Span],
 ) {
-    for (topic, nodes) in publishers(liveness_of).with_ids() {
+    for (topic, nodes) in publishers(liveness_of) {
         let Some(sender) = merged(traffic, findings, topic) else {
             continue;
         };
-        for (node, stretches) in by_publisher(nodes, sender, findings) {
+        for (node, stretches) in by_publisher(&nodes, sender, findings) {
             let Some(liveness) = liveness_of.get_mut(&ElementKey::Publish(node, topic)) else {
                 continue;
             };
@@ -357,14 +357,12 @@ pub(crate) fn fall_silent(
 }
 
 /// The known publishers of each topic.
-fn publishers(liveness_of: &LivenessOf) -> Few<Name, Vec<Name>> {
-    let mut all: Few<Name, Vec<Name>> = Few::default();
-    for what in liveness_of.keys() {
-        if let ElementKey::Publish(node, topic) = what {
-            all.grown(*topic).push(*node);
-        }
-    }
-    all
+fn publishers(liveness_of: &LivenessOf) -> BTreeMap<Name, Vec<Name>> {
+    let nodes = liveness_of.keys().filter_map(|what| match what {
+        ElementKey::Publish(node, topic) => Some((*topic, *node)),
+        _ => None,
+    });
+    grouped(nodes)
 }
 
 /// The sender that represents all senders of a merged topic, unless messages are latched.

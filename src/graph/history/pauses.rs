@@ -116,21 +116,12 @@ pub(crate) fn pauses(
 fn clock_jumps(traffic: &Traffic) -> Vec<Span> {
     let senders = traffic.iter().flatten().flat_map(|of| &of.list);
     let stretches = senders.flat_map(|sender| &sender.stretches);
-    let mut sending: Vec<Span> = stretches.map(|s| Span::new(s.first, s.last)).collect();
-    sending.sort_unstable_by_key(|span| span.start);
-    let mut until = Stamp::MAX;
-    let mut found = Vec::new();
-    for span in sending {
-        if span.start.since(until) > FAR_DAYS * DAY {
-            found.push(Span::new(until, span.start));
-        }
-        until = if until == Stamp::MAX {
-            span.end
-        } else {
-            until.max(span.end)
-        };
-    }
-    found
+    let sending = stretches.map(|s| Span::new(s.first, s.last)).collect();
+    let runs = Span::joined(sending, FAR_DAYS * DAY);
+    let jumps = runs
+        .windows(2)
+        .map(|pair| Span::new(pair[0].end, pair[1].start));
+    jumps.collect()
 }
 
 /// The gaps of senders that rarely have any, sorted.

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use crate::base::error::Result;
-use crate::base::ids::Few;
+use crate::base::ids::{Few, grouped};
 use crate::base::name::role;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::{Recorded, spool_error};
@@ -223,14 +223,10 @@ fn roomy(liveness_of: &LivenessOf) -> History {
 
 /// The messages that each node sends, without latched ones.
 fn sent(traffic: &Traffic) -> Few<Name, Vec<&TopicSender>> {
-    let mut sent: Few<Name, Vec<&TopicSender>> = Few::default();
     let senders = traffic.iter().flatten().flat_map(|of| &of.list);
-    for sender in senders.filter(|sender| !sender.latched) {
-        if let Some(node) = sender.node {
-            sent.grown(node).push(sender);
-        }
-    }
-    sent
+    let own = senders.filter(|sender| !sender.latched);
+    let own = grouped(own.filter_map(|sender| Some((sender.node?, sender))));
+    own.into_iter().collect()
 }
 
 struct Assembly<'a> {
