@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
 use crate::bag::model::{ConnectionId, Message, Reader, Report, Sink};
-use crate::bag::straight::pass;
+use crate::bag::straight::{Straightened, pass};
 use crate::base::error::Result;
 use crate::base::ids::ById;
 use crate::base::notice::{Notice, NoticeKind};
@@ -390,30 +390,8 @@ impl Reader for Moved {
 
     fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
         let range = range.map(|range| range.moved(self.by.saturating_neg()));
-        self.reader
-            .read(range, &mut MovedSink { sink, by: self.by })
-    }
-}
-
-/// A sink that moves all times.
-struct MovedSink<'a> {
-    sink: &'a mut dyn Sink,
-    by: i64,
-}
-
-impl Sink for MovedSink<'_> {
-    fn behind(&mut self) -> Option<&mut dyn Sink> {
-        Some(&mut *self.sink)
-    }
-
-    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
-        let stamps: Vec<Stamp> = stamps.iter().map(|time| time.plus(self.by)).collect();
-        self.sink.stamps(connection, &stamps, sizes);
-    }
-
-    fn message(&mut self, message: Message<'_>) {
-        let time = message.time.plus(self.by);
-        self.sink.message(Message { time, ..message });
+        let mut moved = Straightened::by(self.by, sink);
+        self.reader.read(range, &mut moved)
     }
 }
 

@@ -16,7 +16,7 @@ use records::{DATA_END, ENTRY, FOOTER, FieldCursor, HEAD, SchemaRecord};
 
 use crate::bag::chunked::{
     self, Chunk, ChunkPlan, Connections, Counts, Grammar, Index, IndexSum, NoRecord, RecordHead,
-    RecordKind, SecondReading, Tail, Unindexed, pass, walk,
+    RecordKind, SecondReading, Tail, Unindexed, pass, peek_whole, walk,
 };
 use crate::bag::input::FormatRow;
 use crate::bag::model::{Connection, MOST_PAYLOAD, Sink};
@@ -58,8 +58,9 @@ impl Grammar for Mcap {
     const CLOSING: &'static [u8] = MAGIC;
     type Description = Described;
 
-    fn accept(_path: &Path, _head: &[u8]) -> Result<()> {
-        Ok(())
+    /// The facts in the file's header.
+    fn accept(_path: &Path, head: &[u8]) -> Result<Vec<(String, String)>> {
+        Ok(facts(head).unwrap_or_default())
     }
 
     fn begin(stream: &mut ByteStream<'_>) {
@@ -126,33 +127,8 @@ impl Grammar for Mcap {
         read(source)
     }
 
-    fn is_summed(source: Option<&FileSource>) -> bool {
-        source.is_none_or(|source| !matches!(data_crc(source), Ok(Some(0))))
-    }
-
-    fn is_ended(source: &FileSource) -> bool {
-        matches!(data_crc(source), Ok(Some(_)))
-    }
-
-    /// The facts in the file's header.
-    fn facts(head: &[u8]) -> Vec<(String, String)> {
-        let mut cursor = FieldCursor(head.get(MAGIC.len()..).unwrap_or_default());
-        let (kind, len) = (cursor.u8(), cursor.u64().unwrap_or(0));
-        let record = usize::try_from(len)
-            .ok()
-            .and_then(|len| cursor.0.get(..len));
-        let (Some(op::HEADER), Some(record)) = (kind, record) else {
-            return Vec::new();
-        };
-        let mut cursor = FieldCursor(record);
-        let (Some(profile), Some(library)) = (cursor.text(), cursor.text()) else {
-            return Vec::new();
-        };
-        let known = [("profile", profile), ("library", library)];
-        let known = known.into_iter().filter(|(_, value)| !value.is_empty());
-        known
-            .map(|(name, value)| (name.to_owned(), value))
-            .collect()
+    fn stated_sum(source: &FileSource) -> Option<u32> {
+        data_crc(source).ok().flatten()
     }
 
     /// The crate reads from the front, with or without a summary.
@@ -166,6 +142,21 @@ impl Grammar for Mcap {
             ..SecondReading::default()
         }
     }
+}
+
+/// The facts in the file's header, if its first bytes contain it.
+fn facts(head: &[u8]) -> Option<Vec<(String, String)>> {
+    let mut cursor = FieldCursor(head.get(MAGIC.len()..)?);
+    let kind = cursor.u8().filter(|kind| *kind == op::HEADER);
+    let len = usize::try_from(kind.and(cursor.u64())?).ok()?;
+    let mut cursor = FieldCursor(cursor.0.get(..len)?);
+    let known = [("profile", cursor.text()?), ("library", cursor.text()?)];
+    let known = known.into_iter().filter(|(_, value)| !value.is_empty());
+    Some(
+        known
+            .map(|(name, value)| (name.to_owned(), value))
+            .collect(),
+    )
 }
 
 /// The time and the offset in an entry of a message index.
@@ -273,11 +264,7 @@ impl Summary {
             if len > MOST_PAYLOAD as u64 {
                 return Err(NoRecord::Broken);
             }
-            let wanted = usize::try_from(len).unwrap_or(usize::MAX);
-            let record = stream.peek(wanted)?;
-            if record.len() < wanted {
-                return Err(NoRecord::Cut);
-            }
+            let record = peek_whole(stream, len)?;
             match kind {
                 op::SCHEMA => self.tail.describe(&Described::Schema, record)?,
                 // A channel may precede its schema.

@@ -56,9 +56,9 @@ impl Grammar for Rosbag1 {
     type Description = Described;
 
     /// Refuses bags older than version 2, and encrypted ones.
-    fn accept(path: &Path, head: &[u8]) -> Result<()> {
+    fn accept(path: &Path, head: &[u8]) -> Result<Vec<(String, String)>> {
         if !head.starts_with(b"#ROSRECORD V") {
-            return refuse_encrypted(path, head);
+            return refuse_encrypted(path, head).map(|()| Vec::new());
         }
         let line = head.split(|b| *b == b'\n').next().unwrap_or_default();
         let line = String::from_utf8_lossy(&line[..line.len().min(32)]);
@@ -127,10 +127,6 @@ impl Grammar for Rosbag1 {
 
     fn plan(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexed>> {
         read_tail(source)
-    }
-
-    fn facts(_head: &[u8]) -> Vec<(String, String)> {
-        Vec::new()
     }
 
     fn verify(

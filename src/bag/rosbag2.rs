@@ -156,15 +156,16 @@ impl BagFolder {
         let there = storage(path);
         let instead = found.is_empty() && !there.is_empty();
         for why in missing {
-            if instead {
+            let (kind, text) = if instead {
                 let text = format!("{why}; read the existing files instead");
-                self.note(NoticeKind::Note, text);
+                (NoticeKind::Note, text)
             } else {
-                self.note(
+                (
                     NoticeKind::Damaged,
                     format!("a part of the recording: {why}"),
-                );
-            }
+                )
+            };
+            self.note(kind, text);
         }
         if instead {
             self.note_gaps(&there);

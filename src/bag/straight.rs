@@ -191,11 +191,11 @@ pub(crate) struct ClockFall {
     pub(crate) length: i64,
 }
 
-/// A sink that shifts each run to after the previous one.
+/// A sink that shifts each run of a bag: to after the previous one.
 pub(crate) struct Straightened<'a> {
     sink: &'a mut dyn Sink,
     seams: &'a [Seam],
-    /// The shift of each run in nanoseconds; 0 for the first.
+    /// The shift of each run in nanoseconds; 0 for the first, unless the whole bag is shifted.
     shifts: Vec<i64>,
     /// The number of stamps and of messages per connection so far.
     counts: ById<ConnectionId, [u64; 2]>,
@@ -232,6 +232,14 @@ impl<'a> Straightened<'a> {
         }
     }
 
+    /// One that shifts the only run of a bag by as many nanoseconds.
+    pub(crate) fn by(nanos: i64, sink: &'a mut dyn Sink) -> Self {
+        Self {
+            shifts: vec![nanos],
+            ..Self::new(&[], sink)
+        }
+    }
+
     /// The shifted time of a connection's next stamp or message.
     fn moved(&mut self, connection: ConnectionId, kind: usize, time: Stamp) -> Stamp {
         let next = &mut self.counts.grown(connection)[kind];
@@ -252,7 +260,7 @@ impl Sink for Straightened<'_> {
     }
 
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
-        if self.seams.is_empty() {
+        if self.shifts == [0] {
             return self.sink.stamps(connection, stamps, sizes);
         }
         let moved = stamps.iter().map(|time| self.moved(connection, 0, *time));
@@ -261,7 +269,7 @@ impl Sink for Straightened<'_> {
     }
 
     fn message(&mut self, message: Message<'_>) {
-        if self.seams.is_empty() {
+        if self.shifts == [0] {
             return self.sink.message(message);
         }
         let time = self.moved(message.connection, 1, message.time);

@@ -218,22 +218,6 @@ impl<G: Grammar> Announced<G> {
         Some((id, self.wants[id.0 as usize]))
     }
 
-    /// As [`Announced::describe`], for a description of `len` bytes that follows in `stream`; one that is too long to be
-    /// one is ignored. The outer error is that of the stream.
-    pub(crate) fn read(
-        &mut self,
-        stream: &mut ByteStream<'_>,
-        (what, len): (&G::Description, u64),
-        sink: &mut dyn Sink,
-    ) -> Result<Result<Option<(u32, ConnectionId)>, NoRecord>, NoRecord> {
-        let new = if len > MOST_PAYLOAD as u64 {
-            Ok(None)
-        } else {
-            self.describe(what, peek_whole(stream, len)?, sink)
-        };
-        pass(stream, len).map(|()| new)
-    }
-
     /// Announces a connection that the bag calls `raw` and does not describe.
     pub(super) fn unnamed(&mut self, raw: u32, sink: &mut dyn Sink) -> Option<ConnectionId> {
         let connection = Connection {
