@@ -92,12 +92,6 @@ pub(crate) fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>
     Ok(all)
 }
 
-/// The bytes of `whole` that correspond to `done` of `total` equal parts.
-pub(crate) fn share(done: usize, total: usize, whole: u64) -> u64 {
-    let bytes = u128::from(whole) * done as u128 / (total as u128).max(1);
-    u64::try_from(bytes).unwrap_or(whole)
-}
-
 /// Stamps and sizes of single messages, batched per connection so that a sink receives long runs.
 #[derive(Default)]
 pub(crate) struct Gather {
@@ -314,7 +308,7 @@ impl Sink for BatchSender {
 pub(crate) const GROUP: usize = 16;
 
 /// Runs `work` on the parts `0..count` on `threads` threads and reports their findings to `sink` in part order:
-/// the same calls as with one thread. `after` is called after each reported part.
+/// the same calls as with one thread. Reports progress after each part, as equal shares of `whole` bytes.
 ///
 /// All connections must have been announced before; `work` cannot announce more.
 pub(crate) fn in_order(
@@ -322,8 +316,12 @@ pub(crate) fn in_order(
     threads: usize,
     work: &(dyn Fn(usize, &mut dyn Sink) + Sync),
     sink: &mut dyn Sink,
-    mut after: impl FnMut(usize, &mut dyn Sink),
+    whole: u64,
 ) {
+    let after = |part: usize, sink: &mut dyn Sink| {
+        let done = u128::from(whole) * (part as u128 + 1) / (count as u128).max(1);
+        sink.progress(u64::try_from(done).unwrap_or(whole), whole);
+    };
     if threads <= 1 {
         for part in 0..count {
             work(part, sink);

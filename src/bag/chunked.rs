@@ -16,7 +16,7 @@ use std::sync::Arc;
 use foldhash::HashSet;
 use index::Query;
 
-use crate::bag::adapters::{Bounds, Clip, GROUP, in_order, share};
+use crate::bag::adapters::{Bounds, Clip, GROUP, in_order};
 use crate::bag::decompress::Compression;
 use crate::bag::input::{BagPlace, file_name, head};
 use crate::bag::model::{Connection, OpenOptions, Reader, Report, Sink, Tier, Want, damaged};
@@ -238,17 +238,15 @@ impl<G: Grammar> Indexed<G> {
         let connections = plan.connections.list().iter();
         let mut wants: Vec<Want> = connections.map(|c| sink.connection(c)).collect();
         Want::resolve(&mut wants);
-        let chunks = plan.within(range);
+        let reaches = |chunk: &&Chunk| range.is_none_or(|range| chunk.reaches(range));
+        let chunks: Vec<&Chunk> = plan.chunks.iter().filter(reaches).collect();
         let query = self.query(plan, &wants, range);
         let groups: Vec<&[&Chunk]> = chunks.chunks(GROUP).collect();
         let work = |at: usize, sink: &mut dyn Sink| {
             groups[at].iter().for_each(|chunk| query.read(chunk, sink));
         };
-        let whole = self.source.len();
         let threads = threads(chunks.len(), plan.longest_index());
-        in_order(groups.len(), threads, &work, sink, |at, sink| {
-            sink.progress(share(at + 1, groups.len(), whole), whole);
-        });
+        in_order(groups.len(), threads, &work, sink, self.source.len());
         let samples = BTreeSet::from([0, chunks.len() / 2, chunks.len().saturating_sub(1)]);
         let samples = samples.into_iter().filter_map(|at| chunks.get(at));
         let compression = samples
@@ -433,12 +431,6 @@ impl ChunkPlan {
         self.chunks.iter().map(len).max().unwrap_or(0)
     }
 
-    /// The chunks that may contain messages inside `range`.
-    fn within(&self, range: Option<Span>) -> Vec<&Chunk> {
-        let reaches = |c: &&Chunk| range.is_none_or(|range| c.reaches(range));
-        self.chunks.iter().filter(reaches).collect()
-    }
-
     /// The time that each chunk covers which `read` inspects: the chunks stated to be first and last, or all of them if
     /// they are few or one of these two has other times than stated.
     fn spans(&self, read: impl Fn(&Chunk, &mut dyn Sink)) -> Vec<(usize, Span)> {
@@ -466,12 +458,12 @@ impl ChunkPlan {
 #[derive(Clone, Debug)]
 pub(crate) struct Unindexed {
     pub(crate) why: String,
-    pub(crate) fault: Fault,
+    fault: Fault,
 }
 
 /// What a missing or wrong index implies about the bag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Fault {
+enum Fault {
     /// No damage: the index was never written.
     Missing,
     /// The head states that the bag was longer.
@@ -481,18 +473,24 @@ pub(crate) enum Fault {
 }
 
 impl Unindexed {
-    /// An error with this reason: the index is missing.
-    pub(crate) fn missing<T>(why: impl Into<String>) -> Result<T, Self> {
-        let fault = Fault::Missing;
+    fn of<T>(fault: Fault, why: impl Into<String>) -> Result<T, Self> {
         let why = why.into();
         Err(Self { why, fault })
     }
 
+    /// An error with this reason: the index is missing.
+    pub(crate) fn missing<T>(why: impl Into<String>) -> Result<T, Self> {
+        Self::of(Fault::Missing, why)
+    }
+
+    /// An error with this reason: the head states that the bag was longer.
+    pub(crate) fn cut<T>(why: impl Into<String>) -> Result<T, Self> {
+        Self::of(Fault::Cut, why)
+    }
+
     /// An error with this reason: the index contradicts itself or the bag.
     pub(crate) fn wrong<T>(why: impl Into<String>) -> Result<T, Self> {
-        let fault = Fault::Wrong;
-        let why = why.into();
-        Err(Self { why, fault })
+        Self::of(Fault::Wrong, why)
     }
 }
 

@@ -123,8 +123,26 @@ impl Grammar for Mcap {
         entries.filter_map(|e| Some(entry(e)?.0)).collect()
     }
 
+    /// Reads the summary at the end of `source`.
     fn plan(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexed>> {
-        read(source)
+        let (start, crc) = match footer(source)? {
+            Ok(found) => found,
+            Err(reason) => return Ok(Err(reason)),
+        };
+        let mut summary = Summary::default();
+        summary.tail.plan.body = MAGIC.len() as u64..start;
+        let end = source.len() - CRC_AND_CLOSING;
+        let mut stream = ByteStream::of_file(source, start, end, FAR);
+        stream.sum_up();
+        match summary.records(&mut stream) {
+            Ok(()) => {}
+            Err(NoRecord::Io(e)) => return Err(e),
+            Err(_) => return Ok(Unindexed::wrong("its summary is damaged")),
+        }
+        if crc != 0 && stream.sum() != Some(crc) {
+            return Ok(Unindexed::wrong("the checksum of its summary is wrong"));
+        }
+        Ok(summary.into_plan(source))
     }
 
     fn stated_sum(source: &FileSource) -> Option<u32> {
@@ -170,28 +188,6 @@ fn entry(bytes: &[u8]) -> Option<(Stamp, u64)> {
 /// The most channels: as many as there are ids.
 const MOST_CHANNELS: usize = 1 << 16;
 
-/// Reads the summary at the end of `source`.
-fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexed>> {
-    let (start, crc) = match footer(source)? {
-        Ok(found) => found,
-        Err(reason) => return Ok(Err(reason)),
-    };
-    let mut summary = Summary::default();
-    summary.tail.plan.body = MAGIC.len() as u64..start;
-    let end = source.len() - CRC_AND_CLOSING;
-    let mut stream = ByteStream::of_file(source, start, end, FAR);
-    stream.sum_up();
-    match summary.records(&mut stream) {
-        Ok(()) => {}
-        Err(NoRecord::Io(e)) => return Err(e),
-        Err(_) => return Ok(Unindexed::wrong("its summary is damaged")),
-    }
-    if crc != 0 && stream.sum() != Some(crc) {
-        return Ok(Unindexed::wrong("the checksum of its summary is wrong"));
-    }
-    Ok(summary.into_plan(source))
-}
-
 /// The number of bytes of a footer record and of the closing bytes of the file.
 const END: usize = 9 + 20 + 8;
 
@@ -208,12 +204,10 @@ fn footer(source: &FileSource) -> io::Result<Result<(u64, u32), Unindexed>> {
     let mut cursor = FieldCursor(&bytes[..got]);
     let head = (cursor.u8(), cursor.u64());
     let fields = (cursor.u64(), cursor.u64(), cursor.u32());
-    let (Some(start), Some(_), Some(crc)) = fields else {
+    let is_footer = head == (Some(op::FOOTER), Some(FOOTER)) && bytes[..got].ends_with(MAGIC);
+    let (true, (Some(start), Some(_), Some(crc))) = (is_footer, fields) else {
         return Ok(Unindexed::wrong("its end is missing"));
     };
-    if !bytes[..got].ends_with(MAGIC) || head != (Some(op::FOOTER), Some(FOOTER)) {
-        return Ok(Unindexed::wrong("its end is missing"));
-    }
     Ok(match start {
         0 => Unindexed::missing("it has no summary"),
         n if n < MAGIC.len() as u64 || n > at => {

@@ -13,7 +13,7 @@ use crate::base::time::Stamp;
 const LONGEST_NS: i64 = 365 * 86_400_000_000_000;
 
 /// The point in a bag at which a new run begins.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Seam {
     /// The last time of the previous run and the first of this run, as recorded.
     pub(crate) before: Stamp,
@@ -36,6 +36,7 @@ struct Line {
 }
 
 /// A run that may have begun.
+#[derive(Default)]
 struct Suspect {
     seam: Seam,
     /// The numbers of connections whose time went back, and of those whose time continued.
@@ -120,11 +121,8 @@ impl<'a> Watched<'a> {
             };
             self.suspect = Some(Suspect {
                 seam,
-                fell: 0,
-                went_on: 0,
-                messages: 0,
-                is_past: false,
                 is_in_part: true,
+                ..Suspect::default()
             });
             return self.watch(at, time);
         }

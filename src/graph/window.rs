@@ -170,13 +170,12 @@ pub fn divide(division: &Division, span: Span) -> Result<Windows> {
     }
     let starts = (0..many).map(|k| first.plus(k * step.nanos()));
     let end = |start: Stamp| start.plus(period.nanos()).min(span.end);
+    let spans = starts.map(|at| Span::new(at.max(span.start), end(at)));
     Ok(Windows {
         span,
         period,
         step,
-        spans: starts
-            .map(|at| Span::new(at.max(span.start), end(at)))
-            .collect(),
+        spans: spans.collect(),
     })
 }
 

@@ -167,16 +167,13 @@ impl<'a> GraphAssembly<'a> {
             let mut column = ColumnWriter::default();
             for sum in own {
                 sent[sum.window].add(&sum.arrivals, self.windows[sum.window]);
-                // Only topics show these two.
-                let (median, gap) = (Number::Unknown, Number::Unknown);
-                column.push(
-                    sum.window,
-                    Row {
-                        median,
-                        gap,
-                        ..sum.row
-                    },
-                );
+                let row = Row {
+                    // Only topics show these two.
+                    median: Number::Unknown,
+                    gap: Number::Unknown,
+                    ..sum.row
+                };
+                column.push(sum.window, row);
             }
             let history = self.history;
             let (node, topic) = (history.node_ids.some(node), history.topic_ids.some(topic));
@@ -232,14 +229,11 @@ impl<'a> GraphAssembly<'a> {
             let lives = |life: Span| life.start < seen.window.end && seen.window.start < life.end;
             let has_sender = senders.is_empty() || senders.iter().any(|s| s.spans().any(lives));
             let measures = all.measures.of(what, seen.at);
-            let row = sum.map_or_else(
-                || Row {
-                    count: Some(0),
-                    bytes: sums.map(|_| 0),
-                    ..Row::default()
-                },
-                |sum| sum.row,
-            );
+            let none = Row {
+                count: Some(0),
+                bytes: sums.map(|_| 0),
+                ..Row::default()
+            };
             Row {
                 state: match seen.record.state(seen.window, sum.is_some()) {
                     State::Active if sum.is_none() && !has_sender => State::Silent,
@@ -248,7 +242,7 @@ impl<'a> GraphAssembly<'a> {
                 confidence: seen.confidence,
                 drops: measures.drops,
                 age: Number::of(measures.age_s),
-                ..row
+                ..sum.map_or(none, |sum| sum.row)
             }
         });
     }

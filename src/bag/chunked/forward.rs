@@ -689,9 +689,7 @@ impl<G: Grammar> Growing for GrowingChunks<G> {
         if self.is_closed {
             std::mem::take(&mut self.walk).finish(&stop, at, sink);
         }
-        self.behind = self
-            .last_bytes(&source)
-            .map_err(Error::io("read", &self.path))?;
+        self.behind = self.last_bytes(&source).map_err(fail())?;
         Ok(Growth::More)
     }
 

@@ -300,11 +300,8 @@ pub(crate) fn nameless(sink: &mut dyn Sink, count: u64) {
 
 /// Reports messages that only the index has.
 pub(super) fn absent(sink: &mut dyn Sink, count: u64) {
-    damaged(
-        sink,
-        count,
-        "messages are in the index but not in their chunk",
-    );
+    let text = "messages are in the index but not in their chunk";
+    damaged(sink, count, text);
 }
 
 /// Passes on the wanted part of the message at the position of `stream`, and skips it.
@@ -388,11 +385,8 @@ impl<G: Grammar> Query<'_, G> {
         let times = (chunk.first, chunk.last);
         let found = found.filter(|found| found.index.times().is_none_or(|own| spans(own, times)));
         let Some(found) = found else {
-            damaged(
-                sink,
-                1,
-                "chunks were read whole, since their index is missing or wrong",
-            );
+            let text = "chunks were read whole, since their index is missing or wrong";
+            damaged(sink, 1, text);
             let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, FAR);
             self.walked(&mut stream, Share::Whole, sink);
             return self.unnamed(chunk, sink);

@@ -77,7 +77,7 @@ pub(crate) struct Counts {
 }
 
 /// The head of a chunk, before its records.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct ChunkHead {
     /// `None` for an unknown compression.
     pub(crate) how: Option<Compression>,

@@ -73,7 +73,7 @@ pub(crate) struct Record {
     /// Whether it is silent without a message in the window.
     needs_messages: bool,
     /// The times at which it was silent although it existed; `None` for a silence to the end.
-    silences: Vec<Silence>,
+    pub(crate) silences: Vec<Silence>,
 }
 
 impl Record {
@@ -97,11 +97,6 @@ impl Record {
             needs_messages: false,
             silences: Vec::new(),
         }
-    }
-
-    /// The times at which it was silent although it existed; `None` for a silence to the end.
-    pub(crate) fn silences(&self) -> &[Silence] {
-        &self.silences
     }
 
     /// The intervals in which it exists, half-open.
@@ -324,17 +319,13 @@ impl Assembly<'_> {
         let unknown_publishers = self.unknown_publishers(name);
         let streams = traffic.iter().flat_map(|of| &of.streams);
         let values = &self.findings.values;
-        let mut types: Vec<_> = streams
-            .map(|s| self.findings.streams[*s].connection.type_name.clone())
-            .chain(values.types(name))
-            .filter(|name| !name.is_empty())
-            .collect();
-        types.sort_unstable();
-        types.dedup();
+        let types = streams.map(|s| self.findings.streams[*s].connection.type_name.clone());
+        let types = types.chain(values.types(name));
+        let types: BTreeSet<Arc<str>> = types.filter(|name| !name.is_empty()).collect();
         let all = &mut self.history;
         let id = all.elements.topics.push(Topic {
             name: self.findings.text(name).into(),
-            types,
+            types: types.into_iter().collect(),
             seen: seen(liveness),
             qos: values.quality(name),
             unknown_publishers,
@@ -410,7 +401,7 @@ fn seen(liveness: &Liveness) -> Existence {
 }
 
 fn spans(liveness: &Liveness) -> Vec<Span> {
-    let span = |life: &Lifetime| Span::new(life.from(), life.to().plus(1));
+    let span = |life: &Lifetime| Span::new(life.from, life.to.plus(1));
     liveness.lives.iter().map(span).collect()
 }
 

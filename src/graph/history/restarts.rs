@@ -325,12 +325,9 @@ fn falls_of(
         let is_quick = |from: Place, to: Place| {
             let numbers = recorded.numbers.some(from.1);
             let is_high = |numbers: &Numbers| {
-                let before = numbers
-                    .at(from.0)
-                    .is_some_and(|before| before.number > BEGUN_LONG);
-                before
-                    && numbers
-                        .is_one_counter(recorded.messages.count(recorded.streams[from.1].times))
+                let many = recorded.messages.count(recorded.streams[from.1].times);
+                let has_begun = |before: Number| before.number > BEGUN_LONG;
+                numbers.at(from.0).is_some_and(has_begun) && numbers.is_one_counter(many)
             };
             to.0.since(from.0) < GAP_NS && from.1 == to.1 && numbers.is_some_and(is_high)
         };
