@@ -170,11 +170,8 @@ fn facts(head: &[u8]) -> Option<Vec<(String, String)>> {
     let mut cursor = FieldCursor(cursor.0.get(..len)?);
     let known = [("profile", cursor.text()?), ("library", cursor.text()?)];
     let known = known.into_iter().filter(|(_, value)| !value.is_empty());
-    Some(
-        known
-            .map(|(name, value)| (name.to_owned(), value))
-            .collect(),
-    )
+    let facts = known.map(|(name, value)| (name.to_owned(), value));
+    Some(facts.collect())
 }
 
 /// The time and the offset in an entry of a message index.

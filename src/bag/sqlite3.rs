@@ -274,9 +274,8 @@ fn facts(db: &Db) -> Vec<(String, String)> {
         let sql = format!("SELECT CAST({name} AS TEXT) FROM schema LIMIT 1");
         db.first(&sql, |row| row.text(0)).ok().flatten()
     };
-    known
-        .filter_map(|n| Some(((*n).to_owned(), value(&n)?)))
-        .collect()
+    let facts = known.filter_map(|name| Some(((*name).to_owned(), value(&name)?)));
+    facts.collect()
 }
 
 /// Whether the first payload is a Zstandard frame; a CDR payload never begins like one.

@@ -170,6 +170,7 @@ impl<G: Grammar> Walk<G> {
                 _ => false,
             };
             if is_found {
+                // The bytes from `from` on are not records.
                 let lost = stream.position() - from;
                 forward.damage(&format!(
                     "skipped {lost} bytes at byte {from} that are not records"
