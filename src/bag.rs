@@ -123,22 +123,16 @@ pub(crate) fn follow(input: &Input) -> Result<Box<dyn Growing>> {
         Input::Stdin => None,
     };
     let input = within.as_ref().unwrap_or(input);
-    match input {
-        Input::Path(path) if !input.is_pipe() => match sniff(input)? {
-            InputKind::Bag(FormatRow {
-                follow: Some(follow),
-                ..
-            }) => follow(path),
-            _ => Err(fixed(input)),
-        },
-        _ => Err(fixed(input)),
+    if let Input::Path(path) = input
+        && !input.is_pipe()
+        && let InputKind::Bag(row) = sniff(input)?
+        && let Some(follow) = row.follow
+    {
+        return follow(path);
     }
-}
-
-fn fixed(input: &Input) -> Error {
     let what = "it cannot be followed while it grows";
     let hint = "give a `.bag.active`, `.bag`, `.mcap` or `.db3` file, or a rosbag2 folder";
-    Error::unsupported(input.name(), what, hint)
+    Err(Error::unsupported(input.name(), what, hint))
 }
 
 // Many bags, only a few of them open at a time: some systems allow a process only 256 open files.

@@ -34,7 +34,7 @@ pub(crate) use elements::Wiring;
 pub use elements::{
     Edge, EdgeId, Element, Elements, Existence, Node, NodeId, PerElement, Topic, TopicId,
 };
-pub(crate) use history::{History, Record, made, parts, traffic, unread};
+pub(crate) use history::{History, made, parts, traffic, unread};
 use history::{Life, Sending};
 pub(crate) use windowed::{TopicCount, Windowed, counts, graphs};
 
@@ -215,10 +215,8 @@ impl Graph {
                 let topic = self.get(Element::Topic(edge.topic));
                 load.topics_in += 1;
                 load.messages_in += topic.map_or(0, ElementState::messages);
-                add(
-                    &mut load.bytes_in,
-                    topic.map_or(Some(0), |topic| topic.bytes),
-                );
+                let bytes = topic.map_or(Some(0), |topic| topic.bytes);
+                add(&mut load.bytes_in, bytes);
             }
         }
         all

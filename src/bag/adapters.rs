@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
 use crate::bag::model::{ConnectionId, Message, Reader, Report, Sink};
-use crate::bag::straight::pass;
+use crate::bag::straight::{Straightened, pass};
 use crate::base::error::Result;
 use crate::base::ids::ById;
 use crate::base::notice::{Notice, NoticeKind};
@@ -90,12 +90,6 @@ pub(crate) fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>
         all = Some(all.map_or(span, |all| all.hull(span)));
     }
     Ok(all)
-}
-
-/// The bytes of `whole` that correspond to `done` of `total` equal parts.
-pub(crate) fn share(done: usize, total: usize, whole: u64) -> u64 {
-    let bytes = u128::from(whole) * done as u128 / (total as u128).max(1);
-    u64::try_from(bytes).unwrap_or(whole)
 }
 
 /// Stamps and sizes of single messages, batched per connection so that a sink receives long runs.
@@ -314,7 +308,7 @@ impl Sink for BatchSender {
 pub(crate) const GROUP: usize = 16;
 
 /// Runs `work` on the parts `0..count` on `threads` threads and reports their findings to `sink` in part order:
-/// the same calls as with one thread. `after` is called after each reported part.
+/// the same calls as with one thread. Reports progress after each part, as equal shares of `whole` bytes.
 ///
 /// All connections must have been announced before; `work` cannot announce more.
 pub(crate) fn in_order(
@@ -322,8 +316,12 @@ pub(crate) fn in_order(
     threads: usize,
     work: &(dyn Fn(usize, &mut dyn Sink) + Sync),
     sink: &mut dyn Sink,
-    mut after: impl FnMut(usize, &mut dyn Sink),
+    whole: u64,
 ) {
+    let after = |part: usize, sink: &mut dyn Sink| {
+        let done = u128::from(whole) * (part as u128 + 1) / (count as u128).max(1);
+        sink.progress(u64::try_from(done).unwrap_or(whole), whole);
+    };
     if threads <= 1 {
         for part in 0..count {
             work(part, sink);
@@ -390,30 +388,8 @@ impl Reader for Moved {
 
     fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
         let range = range.map(|range| range.moved(self.by.saturating_neg()));
-        self.reader
-            .read(range, &mut MovedSink { sink, by: self.by })
-    }
-}
-
-/// A sink that moves all times.
-struct MovedSink<'a> {
-    sink: &'a mut dyn Sink,
-    by: i64,
-}
-
-impl Sink for MovedSink<'_> {
-    fn behind(&mut self) -> Option<&mut dyn Sink> {
-        Some(&mut *self.sink)
-    }
-
-    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
-        let stamps: Vec<Stamp> = stamps.iter().map(|time| time.plus(self.by)).collect();
-        self.sink.stamps(connection, &stamps, sizes);
-    }
-
-    fn message(&mut self, message: Message<'_>) {
-        let time = message.time.plus(self.by);
-        self.sink.message(Message { time, ..message });
+        let mut moved = Straightened::by(self.by, sink);
+        self.reader.read(range, &mut moved)
     }
 }
 

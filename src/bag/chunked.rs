@@ -13,11 +13,12 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
+use foldhash::HashSet;
 use index::Query;
 
-use crate::bag::adapters::{Bounds, Clip, GROUP, in_order, share};
+use crate::bag::adapters::{Bounds, Clip, GROUP, in_order};
 use crate::bag::decompress::Compression;
-use crate::bag::input::{BagPlace, file_name};
+use crate::bag::input::{BagPlace, file_name, head};
 use crate::bag::model::{Connection, OpenOptions, Reader, Report, Sink, Tier, Want, damaged};
 use crate::bag::source::{ByteStream, FAR, FileSource};
 use crate::base::error::{Error, Result};
@@ -47,8 +48,9 @@ pub(crate) trait Grammar: Default + Send + 'static {
     /// The head of a description record.
     type Description;
 
-    /// Rejects input that is not of this format, judging by its first bytes.
-    fn accept(path: &Path, head: &[u8]) -> Result<()>;
+    /// Rejects input that is not of this format, judging by its first bytes; returns the facts that they state, to show in
+    /// `info`.
+    fn accept(path: &Path, head: &[u8]) -> Result<Vec<(String, String)>>;
 
     /// Goes to the first record.
     fn begin(stream: &mut ByteStream<'_>);
@@ -84,18 +86,11 @@ pub(crate) trait Grammar: Default + Send + 'static {
     /// Reads the tail.
     fn plan(source: &FileSource) -> std::io::Result<Result<ChunkPlan, Unindexed>>;
 
-    /// Whether the end of the data may state a checksum of all of it; `None` for a pipe, because its end is not known yet.
-    fn is_summed(_source: Option<&FileSource>) -> bool {
-        false
+    /// The checksum of all data as stated at its end, 0 for none; `None` if the writer did not end the bag, which it may do without
+    /// an index.
+    fn stated_sum(_source: &FileSource) -> Option<u32> {
+        None
     }
-
-    /// Whether the writer ended the bag, also where it wrote no index.
-    fn is_ended(_source: &FileSource) -> bool {
-        false
-    }
-
-    /// Facts from the first bytes, to show in `info`.
-    fn facts(head: &[u8]) -> Vec<(String, String)>;
 
     /// Reports everything that an independent reader finds to `sink`.
     fn verify(
@@ -137,18 +132,16 @@ struct Piped<G> {
 const HEAD: usize = 4096;
 
 /// Opens a bag of this grammar.
-pub(crate) fn open<G: Grammar>(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
+pub(crate) fn open<G: Grammar>(
+    mut place: BagPlace,
+    options: &OpenOptions,
+) -> Result<Box<dyn Reader>> {
     let grammar = PhantomData;
+    let head = head(&mut place, HEAD)?;
     match place {
         BagPlace::File(source) => {
-            let path = source.path().to_owned();
-            let mut head = vec![0; HEAD];
-            let got = source
-                .read_at(0, &mut head)
-                .map_err(Error::io("read", &path))?;
-            G::accept(&path, &head[..got])?;
-            let facts = G::facts(&head[..got]);
-            let plan = G::plan(&source).map_err(Error::io("read", &path))?;
+            let facts = G::accept(source.path(), &head)?;
+            let plan = G::plan(&source).map_err(Error::io("read", source.path()))?;
             Ok(Box::new(Indexed::<G> {
                 source,
                 plan,
@@ -158,10 +151,8 @@ pub(crate) fn open<G: Grammar>(place: BagPlace, options: &OpenOptions) -> Result
                 grammar,
             }))
         }
-        BagPlace::Pipe(name, mut stream) => {
-            let path = Path::new(&name);
-            let head = stream.peek(HEAD).map_err(Error::io("read", path))?;
-            G::accept(path, head)?;
+        BagPlace::Pipe(name, stream) => {
+            G::accept(Path::new(&name), &head)?;
             Ok(Box::new(Piped::<G> {
                 name,
                 stream,
@@ -217,6 +208,7 @@ impl<G: Grammar> Reader for Indexed<G> {
             Err(reason) => self.front_to_back(reason, &mut sink),
         };
         Ok(Report {
+            complete: report.complete && !sink.lost,
             bytes_read: self.source.bytes_read(),
             file_bytes: self.source.len(),
             facts: self.facts.clone(),
@@ -235,10 +227,9 @@ impl<G: Grammar> Indexed<G> {
         Query {
             source: &self.source,
             allowance: Arc::default(),
-            connections: &plan.connections,
+            plan,
             wants,
             range,
-            tail: plan.body.end,
             grammar: PhantomData,
         }
     }
@@ -247,26 +238,21 @@ impl<G: Grammar> Indexed<G> {
         let connections = plan.connections.list().iter();
         let mut wants: Vec<Want> = connections.map(|c| sink.connection(c)).collect();
         Want::resolve(&mut wants);
-        let chunks = plan.within(range);
+        let reaches = |chunk: &&Chunk| range.is_none_or(|range| chunk.reaches(range));
+        let chunks: Vec<&Chunk> = plan.chunks.iter().filter(reaches).collect();
         let query = self.query(plan, &wants, range);
         let groups: Vec<&[&Chunk]> = chunks.chunks(GROUP).collect();
         let work = |at: usize, sink: &mut dyn Sink| {
             groups[at].iter().for_each(|chunk| query.read(chunk, sink));
         };
-        let whole = self.source.len();
         let threads = threads(chunks.len(), plan.longest_index());
-        in_order(groups.len(), threads, &work, sink, |at, sink| {
-            sink.progress(share(at + 1, groups.len(), whole), whole);
-        });
+        in_order(groups.len(), threads, &work, sink, self.source.len());
         let samples = BTreeSet::from([0, chunks.len() / 2, chunks.len().saturating_sub(1)]);
         let samples = samples.into_iter().filter_map(|at| chunks.get(at));
         let compression = samples
-            .filter_map(|c| Some(query.body(c).ok()??.how))
+            .filter_map(|c| Some(query.body(c.start, c.end).ok()??.how))
             .collect();
-        Report {
-            complete: !sink.lost,
-            ..self.report(Tier::Index, &compression)
-        }
+        self.report(Tier::Index, &compression)
     }
 
     fn front_to_back(&self, reason: &Unindexed, sink: &mut Clip<'_>) -> Report {
@@ -285,7 +271,6 @@ impl<G: Grammar> Indexed<G> {
             sink.notice(Notice::new(NoticeKind::Truncated, text));
         }
         Report {
-            complete: !sink.lost,
             tier_reason: Some(reason.why.clone()),
             ..self.report(Tier::Forward, &compression)
         }
@@ -295,27 +280,21 @@ impl<G: Grammar> Indexed<G> {
     /// index and verifies nothing if there was none.
     fn by_the_second_reader(&self, sink: &mut Clip<'_>) -> Report {
         let verified = G::verify(&self.source, &self.plan, sink);
-        let Some(why) = verified.stopped else {
+        let stopped = verified.stopped;
+        if let Some(why) = stopped.as_ref().filter(|_| verified.refused) {
+            let why =
+                format!("the second reader cannot read it ({why}); read from the front instead");
             return Report {
-                complete: !sink.lost,
-                ..self.report(Tier::Verify, &verified.compression)
-            };
-        };
-        if !verified.refused {
-            return Report {
-                complete: false,
-                tier_reason: Some(format!("the second reader stopped: {why}")),
-                ..self.report(Tier::Verify, &verified.compression)
+                // Without an index, the first reading did the same.
+                complete: self.plan.is_ok(),
+                tier_reason: Some(why),
+                ..self.report(Tier::Verify, &self.forward(sink))
             };
         }
-        let compression = self.forward(sink);
         Report {
-            // Without an index, the first reading did the same.
-            complete: !sink.lost && self.plan.is_ok(),
-            tier_reason: Some(format!(
-                "the second reader cannot read it ({why}); read from the front instead"
-            )),
-            ..self.report(Tier::Verify, &compression)
+            complete: stopped.is_none(),
+            tier_reason: stopped.map(|why| format!("the second reader stopped: {why}")),
+            ..self.report(Tier::Verify, &verified.compression)
         }
     }
 
@@ -323,7 +302,7 @@ impl<G: Grammar> Indexed<G> {
         let mut stream = ByteStream::of_file(&self.source, 0, self.source.len(), FAR);
         // Reading bytes that could be skipped pays off only if no damage is known yet.
         let is_sound = matches!(&self.plan, Err(reason) if reason.fault == Fault::Missing);
-        if is_sound && G::is_summed(Some(&self.source)) {
+        if is_sound && G::HAS_END && G::stated_sum(&self.source) != Some(0) {
             stream.sum_up();
         }
         G::begin(&mut stream);
@@ -364,7 +343,8 @@ impl<G: Grammar> Reader for Piped<G> {
     }
 
     fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
-        if G::is_summed(None) {
+        // Whether its end states a checksum is not known yet.
+        if G::HAS_END {
             self.stream.sum_up();
         }
         let head = self.stream.peek(G::OPENING.len());
@@ -451,12 +431,6 @@ impl ChunkPlan {
         self.chunks.iter().map(len).max().unwrap_or(0)
     }
 
-    /// The chunks that may contain messages inside `range`.
-    fn within(&self, range: Option<Span>) -> Vec<&Chunk> {
-        let reaches = |c: &&Chunk| range.is_none_or(|range| c.reaches(range));
-        self.chunks.iter().filter(reaches).collect()
-    }
-
     /// The time that each chunk covers which `read` inspects: the chunks stated to be first and last, or all of them if
     /// they are few or one of these two has other times than stated.
     fn spans(&self, read: impl Fn(&Chunk, &mut dyn Sink)) -> Vec<(usize, Span)> {
@@ -484,12 +458,12 @@ impl ChunkPlan {
 #[derive(Clone, Debug)]
 pub(crate) struct Unindexed {
     pub(crate) why: String,
-    pub(crate) fault: Fault,
+    fault: Fault,
 }
 
 /// What a missing or wrong index implies about the bag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Fault {
+enum Fault {
     /// No damage: the index was never written.
     Missing,
     /// The head states that the bag was longer.
@@ -499,18 +473,24 @@ pub(crate) enum Fault {
 }
 
 impl Unindexed {
-    /// An error with this reason: the index is missing.
-    pub(crate) fn missing<T>(why: impl Into<String>) -> Result<T, Self> {
-        let fault = Fault::Missing;
+    fn of<T>(fault: Fault, why: impl Into<String>) -> Result<T, Self> {
         let why = why.into();
         Err(Self { why, fault })
     }
 
+    /// An error with this reason: the index is missing.
+    pub(crate) fn missing<T>(why: impl Into<String>) -> Result<T, Self> {
+        Self::of(Fault::Missing, why)
+    }
+
+    /// An error with this reason: the head states that the bag was longer.
+    pub(crate) fn cut<T>(why: impl Into<String>) -> Result<T, Self> {
+        Self::of(Fault::Cut, why)
+    }
+
     /// An error with this reason: the index contradicts itself or the bag.
     pub(crate) fn wrong<T>(why: impl Into<String>) -> Result<T, Self> {
-        let fault = Fault::Wrong;
-        let why = why.into();
-        Err(Self { why, fault })
+        Self::of(Fault::Wrong, why)
     }
 }
 
@@ -519,7 +499,8 @@ impl Unindexed {
 pub(crate) struct Tail<G> {
     pub(crate) plan: ChunkPlan,
     pub(crate) grammar: G,
-    used: Used,
+    /// The numbers of the connections that chunks are stated to contain.
+    used: HashSet<u32>,
 }
 
 impl<G: Grammar> Tail<G> {
@@ -554,7 +535,7 @@ impl<G: Grammar> Tail<G> {
             for (raw, count) in counts {
                 sum.add(raw, count);
                 if count > 0 {
-                    self.used.add(raw);
+                    self.used.insert(raw);
                 }
             }
             sum
@@ -580,38 +561,10 @@ impl<G: Grammar> Tail<G> {
     /// Checks that all connections are described of which chunks are stated to contain messages. If not, the chunks themselves
     /// may describe the others.
     pub(crate) fn is_described(&self) -> Result<(), Unindexed> {
-        let small = (0..).zip(&self.used.small).filter(|(_, used)| **used);
-        let small = small.map(|(raw, _)| raw);
-        let mut all = small.chain(self.used.large.iter().copied());
-        if all.all(|raw| self.plan.connections.get(raw).is_some()) {
+        let mut used = self.used.iter();
+        if used.all(|raw| self.plan.connections.get(*raw).is_some()) {
             return Ok(());
         }
         Unindexed::wrong("its index counts messages of undescribed connections")
-    }
-}
-
-/// The numbers of the connections that chunks are stated to contain.
-#[derive(Default)]
-struct Used {
-    /// Flags by number, up to the largest that real bags use.
-    small: Vec<bool>,
-    large: BTreeSet<u32>,
-}
-
-/// Numbers below this have flags.
-const SMALL: usize = 1 << 16;
-
-impl Used {
-    /// Adds the number of a connection.
-    fn add(&mut self, raw: u32) {
-        let at = raw as usize;
-        if at >= SMALL {
-            self.large.insert(raw);
-            return;
-        }
-        if self.small.len() <= at {
-            self.small.resize(at + 1, false);
-        }
-        self.small[at] = true;
     }
 }

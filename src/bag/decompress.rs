@@ -133,16 +133,10 @@ impl Allowance {
     }
 
     fn spend(&self, work: u64) -> io::Result<()> {
-        let spent = self
-            .plain
-            .fetch_add(work, Ordering::Relaxed)
-            .saturating_add(work);
+        let before = self.plain.fetch_add(work, Ordering::Relaxed);
         let packed = self.packed.load(Ordering::Relaxed);
-        if spent
-            > packed
-                .saturating_mul(UNPACKED_FOLD)
-                .saturating_add(UNPACKED)
-        {
+        let most = packed.saturating_mul(UNPACKED_FOLD);
+        if before.saturating_add(work) > most.saturating_add(UNPACKED) {
             return Err(io::Error::other(UNFOLDS));
         }
         Ok(())
@@ -259,17 +253,12 @@ impl<R: Read> Blocks<R> {
                 "an LZ4 block is too long",
             ));
         }
-        let into = if stored {
-            &mut self.plain
-        } else {
-            &mut self.packed
-        };
-        if !stored {
-            into.resize(len, 0);
-        }
-        self.from.read_exact(&mut into[..len])?;
         self.ready = 0..len;
-        if !stored && !self.ended {
+        if stored {
+            self.from.read_exact(&mut self.plain[..len])?;
+        } else if !self.ended {
+            self.packed.resize(len, 0);
+            self.from.read_exact(&mut self.packed)?;
             let n = lz4_flex::block::decompress_into(&self.packed, &mut self.plain);
             self.ready = 0..n.map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e))?;
         }

@@ -242,12 +242,9 @@ fn own_parts(folder: &Path, paths: &[PathBuf]) -> Option<Vec<PathBuf>> {
     let metadata = folder.join("metadata.yaml");
     if metadata.is_file() {
         let is_short = metadata.metadata().is_ok_and(|m| m.len() <= MOST_METADATA);
-        let text = if is_short {
-            fs::read(&metadata)
-        } else {
-            Ok(Vec::new())
-        };
-        let text = String::from_utf8_lossy(&text.unwrap_or_default()).into_owned();
+        let bytes = is_short.then(|| fs::read(&metadata).ok()).flatten();
+        let bytes = bytes.unwrap_or_default();
+        let text = String::from_utf8_lossy(&bytes);
         let is_named = |path: &&PathBuf| {
             let name = file_name(path);
             text.contains(name.trim_end_matches(".zstd"))
@@ -271,11 +268,8 @@ fn numbered(path: &Path) -> Option<String> {
 
 /// Whether a path is a bag by its first bytes or its extension: a broken bag gets a row too.
 fn is_bag(path: &Path) -> bool {
-    is_named(path)
-        || matches!(
-            super::sniff(&Input::Path(path.to_owned())),
-            Ok(InputKind::Bag(_))
-        )
+    let kind = || super::sniff(&Input::Path(path.to_owned()));
+    is_named(path) || matches!(kind(), Ok(InputKind::Bag(_)))
 }
 
 fn is_named(path: &Path) -> bool {
@@ -284,12 +278,9 @@ fn is_named(path: &Path) -> bool {
 }
 
 fn ends_in(path: &Path, extension: &str) -> bool {
-    let name = path
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_lowercase();
-    name.ends_with(&format!(".{}", extension.trim_start_matches('.')))
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.to_lowercase()
+        .ends_with(&format!(".{}", extension.trim_start_matches('.')))
 }
 
 // The parts of a recording that `rosbag record --split` writes, recognized by their names: `run_2024-05-03-14-03-22_0`,

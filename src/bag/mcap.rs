@@ -16,7 +16,7 @@ use records::{DATA_END, ENTRY, FOOTER, FieldCursor, HEAD, SchemaRecord};
 
 use crate::bag::chunked::{
     self, Chunk, ChunkPlan, Connections, Counts, Grammar, Index, IndexSum, NoRecord, RecordHead,
-    RecordKind, SecondReading, Tail, Unindexed, pass, walk,
+    RecordKind, SecondReading, Tail, Unindexed, pass, peek_whole, walk,
 };
 use crate::bag::input::FormatRow;
 use crate::bag::model::{Connection, MOST_PAYLOAD, Sink};
@@ -58,8 +58,9 @@ impl Grammar for Mcap {
     const CLOSING: &'static [u8] = MAGIC;
     type Description = Described;
 
-    fn accept(_path: &Path, _head: &[u8]) -> Result<()> {
-        Ok(())
+    /// The facts in the file's header.
+    fn accept(_path: &Path, head: &[u8]) -> Result<Vec<(String, String)>> {
+        Ok(facts(head).unwrap_or_default())
     }
 
     fn begin(stream: &mut ByteStream<'_>) {
@@ -122,37 +123,30 @@ impl Grammar for Mcap {
         entries.filter_map(|e| Some(entry(e)?.0)).collect()
     }
 
+    /// Reads the summary at the end of `source`.
     fn plan(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexed>> {
-        read(source)
-    }
-
-    fn is_summed(source: Option<&FileSource>) -> bool {
-        source.is_none_or(|source| !matches!(data_crc(source), Ok(Some(0))))
-    }
-
-    fn is_ended(source: &FileSource) -> bool {
-        matches!(data_crc(source), Ok(Some(_)))
-    }
-
-    /// The facts in the file's header.
-    fn facts(head: &[u8]) -> Vec<(String, String)> {
-        let mut cursor = FieldCursor(head.get(MAGIC.len()..).unwrap_or_default());
-        let (kind, len) = (cursor.u8(), cursor.u64().unwrap_or(0));
-        let record = usize::try_from(len)
-            .ok()
-            .and_then(|len| cursor.0.get(..len));
-        let (Some(op::HEADER), Some(record)) = (kind, record) else {
-            return Vec::new();
+        let (start, crc) = match footer(source)? {
+            Ok(found) => found,
+            Err(reason) => return Ok(Err(reason)),
         };
-        let mut cursor = FieldCursor(record);
-        let (Some(profile), Some(library)) = (cursor.text(), cursor.text()) else {
-            return Vec::new();
-        };
-        let known = [("profile", profile), ("library", library)];
-        let known = known.into_iter().filter(|(_, value)| !value.is_empty());
-        known
-            .map(|(name, value)| (name.to_owned(), value))
-            .collect()
+        let mut summary = Summary::default();
+        summary.tail.plan.body = MAGIC.len() as u64..start;
+        let end = source.len() - CRC_AND_CLOSING;
+        let mut stream = ByteStream::of_file(source, start, end, FAR);
+        stream.sum_up();
+        match summary.records(&mut stream) {
+            Ok(()) => {}
+            Err(NoRecord::Io(e)) => return Err(e),
+            Err(_) => return Ok(Unindexed::wrong("its summary is damaged")),
+        }
+        if crc != 0 && stream.sum() != Some(crc) {
+            return Ok(Unindexed::wrong("the checksum of its summary is wrong"));
+        }
+        Ok(summary.into_plan(source))
+    }
+
+    fn stated_sum(source: &FileSource) -> Option<u32> {
+        data_crc(source).ok().flatten()
     }
 
     /// The crate reads from the front, with or without a summary.
@@ -168,6 +162,18 @@ impl Grammar for Mcap {
     }
 }
 
+/// The facts in the file's header, if its first bytes contain it.
+fn facts(head: &[u8]) -> Option<Vec<(String, String)>> {
+    let mut cursor = FieldCursor(head.get(MAGIC.len()..)?);
+    let kind = cursor.u8().filter(|kind| *kind == op::HEADER);
+    let len = usize::try_from(kind.and(cursor.u64())?).ok()?;
+    let mut cursor = FieldCursor(cursor.0.get(..len)?);
+    let known = [("profile", cursor.text()?), ("library", cursor.text()?)];
+    let known = known.into_iter().filter(|(_, value)| !value.is_empty());
+    let facts = known.map(|(name, value)| (name.to_owned(), value));
+    Some(facts.collect())
+}
+
 /// The time and the offset in an entry of a message index.
 fn entry(bytes: &[u8]) -> Option<(Stamp, u64)> {
     let mut cursor = FieldCursor(bytes);
@@ -178,28 +184,6 @@ fn entry(bytes: &[u8]) -> Option<(Stamp, u64)> {
 
 /// The most channels: as many as there are ids.
 const MOST_CHANNELS: usize = 1 << 16;
-
-/// Reads the summary at the end of `source`.
-fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexed>> {
-    let (start, crc) = match footer(source)? {
-        Ok(found) => found,
-        Err(reason) => return Ok(Err(reason)),
-    };
-    let mut summary = Summary::default();
-    summary.tail.plan.body = MAGIC.len() as u64..start;
-    let end = source.len() - CRC_AND_CLOSING;
-    let mut stream = ByteStream::of_file(source, start, end, FAR);
-    stream.sum_up();
-    match summary.records(&mut stream) {
-        Ok(()) => {}
-        Err(NoRecord::Io(e)) => return Err(e),
-        Err(_) => return Ok(Unindexed::wrong("its summary is damaged")),
-    }
-    if crc != 0 && stream.sum() != Some(crc) {
-        return Ok(Unindexed::wrong("the checksum of its summary is wrong"));
-    }
-    Ok(summary.into_plan(source))
-}
 
 /// The number of bytes of a footer record and of the closing bytes of the file.
 const END: usize = 9 + 20 + 8;
@@ -217,12 +201,10 @@ fn footer(source: &FileSource) -> io::Result<Result<(u64, u32), Unindexed>> {
     let mut cursor = FieldCursor(&bytes[..got]);
     let head = (cursor.u8(), cursor.u64());
     let fields = (cursor.u64(), cursor.u64(), cursor.u32());
-    let (Some(start), Some(_), Some(crc)) = fields else {
+    let is_footer = head == (Some(op::FOOTER), Some(FOOTER)) && bytes[..got].ends_with(MAGIC);
+    let (true, (Some(start), Some(_), Some(crc))) = (is_footer, fields) else {
         return Ok(Unindexed::wrong("its end is missing"));
     };
-    if !bytes[..got].ends_with(MAGIC) || head != (Some(op::FOOTER), Some(FOOTER)) {
-        return Ok(Unindexed::wrong("its end is missing"));
-    }
     Ok(match start {
         0 => Unindexed::missing("it has no summary"),
         n if n < MAGIC.len() as u64 || n > at => {
@@ -273,11 +255,7 @@ impl Summary {
             if len > MOST_PAYLOAD as u64 {
                 return Err(NoRecord::Broken);
             }
-            let wanted = usize::try_from(len).unwrap_or(usize::MAX);
-            let record = stream.peek(wanted)?;
-            if record.len() < wanted {
-                return Err(NoRecord::Cut);
-            }
+            let record = peek_whole(stream, len)?;
             match kind {
                 op::SCHEMA => self.tail.describe(&Described::Schema, record)?,
                 // A channel may precede its schema.

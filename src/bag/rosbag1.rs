@@ -13,9 +13,10 @@ use std::sync::Arc;
 use records::{ENTRY, Header};
 
 use crate::bag::chunked::{
-    self, ChunkPlan, Connections, Fault, Grammar, Index, IndexSum, NoRecord, SecondReading, Tail,
-    Unindexed, pass, peek_whole, walk,
+    self, ChunkHead, ChunkPlan, Connections, Counts, Grammar, Index, IndexSum, MessageHead,
+    NoRecord, RecordHead, RecordKind, SecondReading, Tail, Unindexed, pass, peek_whole, walk,
 };
+use crate::bag::decompress::Compression;
 use crate::bag::input::FormatRow;
 use crate::bag::model::{Connection, Sink};
 use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
@@ -56,16 +57,25 @@ impl Grammar for Rosbag1 {
     type Description = Described;
 
     /// Refuses bags older than version 2, and encrypted ones.
-    fn accept(path: &Path, head: &[u8]) -> Result<()> {
-        if !head.starts_with(b"#ROSRECORD V") {
-            return refuse_encrypted(path, head);
+    fn accept(path: &Path, head: &[u8]) -> Result<Vec<(String, String)>> {
+        if head.starts_with(b"#ROSRECORD V") {
+            let line = head.split(|b| *b == b'\n').next().unwrap_or_default();
+            let line = String::from_utf8_lossy(&line[..line.len().min(32)]);
+            let what = format!("it is of an old format, `{line}`");
+            let hint =
+                "convert it to version 2 with `rosbag fix old.bag new.bag` of a ROS 1 installation";
+            return Err(Error::unsupported(path, what, hint));
         }
-        let line = head.split(|b| *b == b'\n').next().unwrap_or_default();
-        let line = String::from_utf8_lossy(&line[..line.len().min(32)]);
-        let what = format!("it is of an old format, `{line}`");
-        let hint =
-            "convert it to version 2 with `rosbag fix old.bag new.bag` of a ROS 1 installation";
-        Err(Error::unsupported(path, what, hint))
+        let mut stream = ByteStream::of_reader(head);
+        Self::begin(&mut stream);
+        match records::header(&mut stream) {
+            Ok((Header::Bag { encryptor, .. }, _)) if !encryptor.is_empty() => {
+                let what = format!("it is encrypted by `{encryptor}`");
+                let hint = "decrypt it first with `rosbag decrypt`, on a machine that has its key";
+                Err(Error::unsupported(path, what, hint))
+            }
+            _ => Ok(Vec::new()),
+        }
     }
 
     /// The first line names the version.
@@ -76,8 +86,38 @@ impl Grammar for Rosbag1 {
         }
     }
 
-    fn next(stream: &mut ByteStream<'_>) -> Result<chunked::RecordHead<Described>, NoRecord> {
-        records::next(stream)
+    fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>, NoRecord> {
+        let (header, size) = records::header(stream)?;
+        let mut len = u64::from(size);
+        let kind = match header {
+            Header::Chunk { how, size } => RecordKind::Chunk(ChunkHead {
+                how,
+                packed: len,
+                plain: u64::from(size),
+                // A recorder writes the lengths when it closes the chunk.
+                unclosed: len == 0 && how.is_some_and(|how| how != Compression::None),
+                ..ChunkHead::default()
+            }),
+            Header::Message { raw, time } => RecordKind::Message(MessageHead { raw, time, size }),
+            Header::Connection { raw, topic } => RecordKind::Description(Described { raw, topic }),
+            Header::Index { raw, count } => {
+                // Its length is computed from its count: writers of 2010 stored a wrong one.
+                len = u64::from(count.checked_mul(ENTRY).ok_or(NoRecord::Broken)?);
+                RecordKind::Index { raw, count }
+            }
+            Header::Bag { chunks, .. } => RecordKind::Total(Counts {
+                chunks,
+                ..Counts::default()
+            }),
+            Header::ChunkInfo {
+                pos, start, end, ..
+            } => RecordKind::Listed {
+                at: pos,
+                times: (start, end),
+            },
+            Header::Unknown => RecordKind::Unknown { extension: false },
+        };
+        Ok(RecordHead { kind, len })
     }
 
     fn describe(
@@ -125,12 +165,36 @@ impl Grammar for Rosbag1 {
         entries.filter_map(|e| Some(entry(e)?.0)).collect()
     }
 
+    /// Reads the head and the tail of `source`.
     fn plan(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexed>> {
-        read_tail(source)
-    }
-
-    fn facts(_head: &[u8]) -> Vec<(String, String)> {
-        Vec::new()
+        let mut stream = ByteStream::of_file(source, 0, source.len(), NEAR);
+        Self::begin(&mut stream);
+        let (header, len) = match records::header(&mut stream) {
+            Ok(found) => found,
+            Err(NoRecord::Io(e)) => return Err(e),
+            Err(NoRecord::End | NoRecord::Cut) => return Ok(Unindexed::cut(HEAD_DAMAGED)),
+            Err(_) => return Ok(Unindexed::wrong(HEAD_DAMAGED)),
+        };
+        let Header::Bag {
+            index_pos,
+            connections,
+            chunks,
+            ..
+        } = header
+        else {
+            return Ok(Unindexed::wrong("it has no head"));
+        };
+        let body = stream.position() + u64::from(len);
+        if let Err(reason) = placed(index_pos, body, source.len()) {
+            return Ok(Err(reason));
+        }
+        let mut tail = Tail::default();
+        tail.plan.body = body..index_pos;
+        match tail_records(&mut tail, source, (connections, chunks)) {
+            Ok(()) => Ok(into_plan(tail)),
+            Err(NoRecord::Io(e)) => Err(e),
+            Err(_) => Ok(Unindexed::wrong("its index is cut or damaged")),
+        }
     }
 
     fn verify(
@@ -152,21 +216,6 @@ impl Grammar for Rosbag1 {
     }
 }
 
-/// Refuses a bag whose payloads and connections are encrypted.
-fn refuse_encrypted(path: &Path, head: &[u8]) -> Result<()> {
-    let mut stream = ByteStream::of_reader(head);
-    Rosbag1::begin(&mut stream);
-    let Ok((Header::Bag { encryptor, .. }, _)) = records::header(&mut stream) else {
-        return Ok(());
-    };
-    if encryptor.is_empty() {
-        return Ok(());
-    }
-    let what = format!("it is encrypted by `{encryptor}`");
-    let hint = "decrypt it first with `rosbag decrypt`, on a machine that has its key";
-    Err(Error::unsupported(path, what, hint))
-}
-
 /// The index record at `at`: its connection, its count, and the start of its entries.
 fn record_at(bytes: &[u8], at: usize) -> Option<(u32, u32, usize)> {
     let len = records::u32_at(bytes, at)? as usize;
@@ -185,52 +234,15 @@ fn entry(bytes: &[u8]) -> Option<(Stamp, u64)> {
 
 // The tail of a ROS 1 bag: its connections and chunks, and whether they are reliable.
 
-/// Reads the head and the tail of `source`.
-fn read_tail(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexed>> {
-    let mut stream = ByteStream::of_file(source, 0, source.len(), NEAR);
-    Rosbag1::begin(&mut stream);
-    let (header, len) = match records::header(&mut stream) {
-        Ok(found) => found,
-        Err(NoRecord::Io(e)) => return Err(e),
-        Err(error) => {
-            let fault = match error {
-                NoRecord::End | NoRecord::Cut => Fault::Cut,
-                _ => Fault::Wrong,
-            };
-            let why = "its head is damaged".to_owned();
-            return Ok(Err(Unindexed { why, fault }));
-        }
-    };
-    let Header::Bag {
-        index_pos,
-        connections,
-        chunks,
-        ..
-    } = header
-    else {
-        return Ok(Unindexed::wrong("it has no head"));
-    };
-    let body = stream.position() + u64::from(len);
-    if let Err(reason) = placed(index_pos, body, source.len()) {
-        return Ok(Err(reason));
-    }
-    let mut tail = Tail::default();
-    tail.plan.body = body..index_pos;
-    match tail_records(&mut tail, source, (connections, chunks)) {
-        Ok(()) => Ok(into_plan(tail)),
-        Err(NoRecord::Io(e)) => Err(e),
-        Err(_) => Ok(Unindexed::wrong("its index is cut or damaged")),
-    }
-}
+/// The reason why a bag without a readable head is read from the front.
+const HEAD_DAMAGED: &str = "its head is damaged";
 
 /// Rejects an index outside the bag.
 fn placed(index_pos: u64, body: u64, len: u64) -> Result<(), Unindexed> {
     if index_pos == 0 {
         Unindexed::missing("it was never closed and has no index")
     } else if index_pos > len {
-        let why = format!("its index at byte {index_pos} is cut off");
-        let fault = Fault::Cut;
-        Err(Unindexed { why, fault })
+        Unindexed::cut(format!("its index at byte {index_pos} is cut off"))
     } else if index_pos < body {
         Unindexed::wrong(format!("its index cannot be at byte {index_pos}"))
     } else {

@@ -35,6 +35,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
 };
 
 /// A folder's storage files.
+#[derive(Default)]
 struct BagFolder {
     name: String,
     parts: Vec<Box<dyn Reader>>,
@@ -69,11 +70,7 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     }
     let mut folder = BagFolder {
         name: file_name(&path),
-        parts: Vec::new(),
-        overlaps: false,
-        size: 0,
-        metadata: Metadata::default(),
-        notices: Vec::new(),
+        ..BagFolder::default()
     };
     match read_metadata(&path) {
         Ok(found) => folder.metadata = found.unwrap_or_default(),
@@ -87,9 +84,8 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
         parts = folder.files(&path);
     }
     // Decompressing whole parts to learn their times would take too long.
-    let is_packed = parts
-        .iter()
-        .any(|part| part.extension().is_some_and(|e| e == "zstd"));
+    let mut extensions = parts.iter().filter_map(|part| part.extension());
+    let is_packed = extensions.any(|extension| extension == "zstd");
     let files: Vec<Input> = parts.into_iter().map(Input::Path).collect();
     folder.size = files.iter().filter_map(size_on_disk).sum();
     for part in open_each(files, options) {
@@ -156,15 +152,16 @@ impl BagFolder {
         let there = storage(path);
         let instead = found.is_empty() && !there.is_empty();
         for why in missing {
-            if instead {
+            let (kind, text) = if instead {
                 let text = format!("{why}; read the existing files instead");
-                self.note(NoticeKind::Note, text);
+                (NoticeKind::Note, text)
             } else {
-                self.note(
+                (
                     NoticeKind::Damaged,
                     format!("a part of the recording: {why}"),
-                );
-            }
+                )
+            };
+            self.note(kind, text);
         }
         if instead {
             self.note_gaps(&there);
@@ -277,9 +274,8 @@ impl Reader for BagFolder {
 impl BagFolder {
     fn report(&self, parts: &[Report], complete: bool) -> Report {
         let compression: BTreeSet<&String> = parts.iter().flat_map(|r| &r.compression).collect();
-        let worst = parts
-            .iter()
-            .max_by_key(|r| (r.tier, r.tier_reason.is_some()));
+        let rank = |report: &&Report| (report.tier, report.tier_reason.is_some());
+        let worst = parts.iter().max_by_key(rank);
         let mut facts = self.metadata.facts.clone();
         for fact in parts.iter().flat_map(|r| &r.facts) {
             if !facts.iter().any(|(name, _)| *name == fact.0) {
@@ -289,11 +285,10 @@ impl BagFolder {
         if parts.len() > 1 {
             facts.push(("files".to_owned(), parts.len().to_string()));
         }
+        let format = parts.first().map(|report| report.format.as_str());
         Report {
             name: self.name.clone(),
-            format: parts
-                .first()
-                .map_or_else(|| FORMAT.name.to_owned(), |r| r.format.clone()),
+            format: format.unwrap_or(FORMAT.name).to_owned(),
             compression: compression.into_iter().cloned().collect(),
             tier: worst.map_or(super::Tier::Index, |r| r.tier),
             tier_reason: worst.and_then(|r| r.tier_reason.clone()),
@@ -558,18 +553,16 @@ fn understand(root: &Value) -> Metadata {
         };
         metadata.facts.push((name.to_owned(), text));
     }
-    let topics = root
-        .get("topics_with_message_count")
-        .and_then(Value::as_array);
+    let topics = root.get("topics_with_message_count");
+    let topics = topics.and_then(Value::as_array);
     for topic in topics.into_iter().flatten() {
         let Some(topic) = topic.get("topic_metadata") else {
             continue;
         };
         let text = |key| topic.get(key).and_then(Value::as_str).unwrap_or_default();
-        if !text("name").is_empty() {
-            metadata
-                .topics
-                .insert(text("name").to_owned(), of_topic(topic, text));
+        let name = text("name").to_owned();
+        if !name.is_empty() {
+            metadata.topics.insert(name, of_topic(topic, text));
         }
     }
     metadata
@@ -599,10 +592,8 @@ fn of_topic<'v>(topic: &'v Value, text: impl Fn(&'static str) -> &'v str) -> Top
 /// A sentence with the reason why not.
 fn locate(folder: &Path, name: &str) -> Result<PathBuf, String> {
     let path = Path::new(name);
-    if path
-        .components()
-        .any(|c| !matches!(c, Component::Normal(_) | Component::CurDir))
-    {
+    let is_downward = |c: Component<'_>| matches!(c, Component::Normal(_) | Component::CurDir);
+    if !path.components().all(is_downward) {
         return Err(format!("`{name}` leaves the folder and was not followed"));
     }
     let Some(last) = path.file_name() else {

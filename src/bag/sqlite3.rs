@@ -14,7 +14,7 @@ use std::time::SystemTime;
 use db::{Db, Ready, Refusal};
 use rows::{RowRange, RowReader, ZSTD};
 
-use crate::bag::adapters::{Clip, in_order, share};
+use crate::bag::adapters::{Clip, in_order};
 use crate::bag::input::{BagPlace, FormatRow, file_name};
 use crate::bag::model::{
     Connection, ConnectionId, Encoding, Growing, Growth, MOST_PAYLOAD, OpenOptions, Reader, Report,
@@ -115,12 +115,7 @@ fn tables(ready: &Ready, path: &Path) -> Result<(Db, Vec<String>)> {
 fn cut(source: &FileSource) -> Option<String> {
     let mut head = [0; 100];
     source.read_at(0, &mut head).ok().filter(|n| *n == 100)?;
-    let number = |at: usize| {
-        head.get(at..at + 4)?
-            .try_into()
-            .ok()
-            .map(u32::from_be_bytes)
-    };
+    let number = |at: usize| Some(u32::from_be_bytes(head.get(at..at + 4)?.try_into().ok()?));
     let page = match u16::from_be_bytes([head[16], head[17]]) {
         1 => 65_536,
         size => u64::from(size),
@@ -236,10 +231,8 @@ struct StoredDefinition {
 fn definitions(db: &Db) -> Result<BTreeMap<String, StoredDefinition>, Refusal> {
     let mut found = BTreeMap::new();
     let columns = db.columns("message_definitions")?;
-    if !has(
-        &columns,
-        &["topic_type", "encoding", "encoded_message_definition"],
-    ) {
+    let needed = ["topic_type", "encoding", "encoded_message_definition"];
+    if !has(&columns, &needed) {
         return Ok(found);
     }
     let sql = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions LIMIT 10000";
@@ -279,17 +272,16 @@ fn facts(db: &Db) -> Vec<(String, String)> {
     let known = names.iter().filter(|n| has(&columns, &[n]));
     let value = |name: &&&str| {
         let sql = format!("SELECT CAST({name} AS TEXT) FROM schema LIMIT 1");
-        db.first(&sql, &[], |row| row.text(0)).ok().flatten()
+        db.first(&sql, |row| row.text(0)).ok().flatten()
     };
-    known
-        .filter_map(|n| Some(((*n).to_owned(), value(&n)?)))
-        .collect()
+    let facts = known.filter_map(|name| Some(((*name).to_owned(), value(&name)?)));
+    facts.collect()
 }
 
 /// Whether the first payload is a Zstandard frame; a CDR payload never begins like one.
 fn is_packed(db: &Db) -> bool {
     let sql = "SELECT substr(data, 1, 4) FROM messages WHERE octet_length(data) BETWEEN 4 AND 1000000 LIMIT 1";
-    let first = db.first(sql, &[], |row| Some(row.bytes(0)? == ZSTD));
+    let first = db.first(sql, |row| Some(row.bytes(0)? == ZSTD));
     first.ok().flatten() == Some(true)
 }
 
@@ -306,7 +298,7 @@ impl Sqlite3Bag {
             return whole;
         }
         let sql = "SELECT min(rowid), max(rowid) FROM messages";
-        let ends = db.first(sql, &[], |row| row.integer(0).zip(row.integer(1)));
+        let ends = db.first(sql, |row| row.integer(0).zip(row.integer(1)));
         let Ok(Some((first, last))) = ends else {
             return whole;
         };
@@ -322,7 +314,7 @@ impl Sqlite3Bag {
 
 /// Has SQLite check the whole file for damage, and the index of times against the rows.
 fn check(db: &Db, sink: &mut dyn Sink) {
-    let found = db.first("PRAGMA integrity_check(1)", &[], |row| row.text(0));
+    let found = db.first("PRAGMA integrity_check(1)", |row| row.text(0));
     let result = found.map_or_else(|e| e.to_string(), Option::unwrap_or_default);
     if result != "ok" {
         // A first line names the database only.
@@ -353,7 +345,7 @@ impl Reader for Sqlite3Bag {
         let db = Db::open(&self.ready).map_err(|e| broken(&self.path, &e))?;
         // SQLite returns no rows where the first page of a table lost its rows.
         let any = "SELECT rowid FROM messages NOT INDEXED LIMIT 1";
-        if self.verify || matches!(db.first(any, &[], |row| row.integer(0)), Ok(None)) {
+        if self.verify || matches!(db.first(any, |row| row.integer(0)), Ok(None)) {
             check(&db, &mut clip);
         }
         let rows = RowReader::new(self, &wants, range);
@@ -361,10 +353,7 @@ impl Reader for Sqlite3Bag {
         drop(db);
         let threads = if parts.len() > 1 { 8 } else { 1 };
         let work = |at: usize, sink: &mut dyn Sink| rows.read(parts[at], sink);
-        let whole = self.file_bytes;
-        in_order(parts.len(), threads, &work, &mut clip, |at, sink| {
-            sink.progress(share(at + 1, parts.len(), whole), whole);
-        });
+        in_order(parts.len(), threads, &work, &mut clip, self.file_bytes);
         Ok(Report {
             name: file_name(&self.path),
             format: FORMAT.name.to_owned(),
@@ -421,10 +410,8 @@ impl Growing for GrowingDb {
             let meta = path.metadata().ok()?;
             Some((meta.len(), meta.modified().ok()))
         };
-        let now: Vec<_> = [&self.path, &wal]
-            .into_iter()
-            .filter_map(|p| state(p))
-            .collect();
+        let files = [self.path.as_path(), &wal].into_iter();
+        let now: Vec<_> = files.filter_map(state).collect();
         if now == self.seen {
             return Ok(Growth::Same);
         }

@@ -13,7 +13,7 @@ use crate::base::time::Stamp;
 const LONGEST_NS: i64 = 365 * 86_400_000_000_000;
 
 /// The point in a bag at which a new run begins.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Seam {
     /// The last time of the previous run and the first of this run, as recorded.
     pub(crate) before: Stamp,
@@ -36,6 +36,7 @@ struct Line {
 }
 
 /// A run that may have begun.
+#[derive(Default)]
 struct Suspect {
     seam: Seam,
     /// The numbers of connections whose time went back, and of those whose time continued.
@@ -120,11 +121,8 @@ impl<'a> Watched<'a> {
             };
             self.suspect = Some(Suspect {
                 seam,
-                fell: 0,
-                went_on: 0,
-                messages: 0,
-                is_past: false,
                 is_in_part: true,
+                ..Suspect::default()
             });
             return self.watch(at, time);
         }
@@ -191,11 +189,11 @@ pub(crate) struct ClockFall {
     pub(crate) length: i64,
 }
 
-/// A sink that shifts each run to after the previous one.
+/// A sink that shifts each run of a bag: to after the previous one.
 pub(crate) struct Straightened<'a> {
     sink: &'a mut dyn Sink,
     seams: &'a [Seam],
-    /// The shift of each run in nanoseconds; 0 for the first.
+    /// The shift of each run in nanoseconds; 0 for the first, unless the whole bag is shifted.
     shifts: Vec<i64>,
     /// The number of stamps and of messages per connection so far.
     counts: ById<ConnectionId, [u64; 2]>,
@@ -232,6 +230,14 @@ impl<'a> Straightened<'a> {
         }
     }
 
+    /// One that shifts the only run of a bag by as many nanoseconds.
+    pub(crate) fn by(nanos: i64, sink: &'a mut dyn Sink) -> Self {
+        Self {
+            shifts: vec![nanos],
+            ..Self::new(&[], sink)
+        }
+    }
+
     /// The shifted time of a connection's next stamp or message.
     fn moved(&mut self, connection: ConnectionId, kind: usize, time: Stamp) -> Stamp {
         let next = &mut self.counts.grown(connection)[kind];
@@ -252,7 +258,7 @@ impl Sink for Straightened<'_> {
     }
 
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
-        if self.seams.is_empty() {
+        if self.shifts == [0] {
             return self.sink.stamps(connection, stamps, sizes);
         }
         let moved = stamps.iter().map(|time| self.moved(connection, 0, *time));
@@ -261,7 +267,7 @@ impl Sink for Straightened<'_> {
     }
 
     fn message(&mut self, message: Message<'_>) {
-        if self.seams.is_empty() {
+        if self.shifts == [0] {
             return self.sink.message(message);
         }
         let time = self.moved(message.connection, 1, message.time);

@@ -230,28 +230,21 @@ impl Elements {
     /// The names of the node and the topic of an element: both for an edge, otherwise one.
     pub(crate) fn names(&self, element: Element) -> (Option<&str>, Option<&str>) {
         let (node, topic) = self.ends(element);
-        let node = node.and_then(|id| self.nodes.get(id));
-        let topic = topic.and_then(|id| self.topics.get(id));
-        (
-            node.map(|node| node.name.as_str()),
-            topic.map(|topic| topic.name.as_str()),
-        )
+        let node = node.and_then(|id| Some(self.nodes.get(id)?.name.as_str()));
+        let topic = topic.and_then(|id| Some(self.topics.get(id)?.name.as_str()));
+        (node, topic)
     }
 
     /// The node of this name.
     pub fn node(&self, name: &str) -> Option<NodeId> {
-        let at = self
-            .nodes
-            .binary_search_by(|node| node.name.as_str().cmp(name));
-        at.ok().map(Id::of)
+        let order = |node: &Node| node.name.as_str().cmp(name);
+        self.nodes.binary_search_by(order).ok().map(Id::of)
     }
 
     /// The topic of this name.
     pub fn topic(&self, name: &str) -> Option<TopicId> {
-        let at = self
-            .topics
-            .binary_search_by(|topic| topic.name.as_str().cmp(name));
-        at.ok().map(Id::of)
+        let order = |topic: &Topic| topic.name.as_str().cmp(name);
+        self.topics.binary_search_by(order).ok().map(Id::of)
     }
 
     /// Who publishes and subscribes to what, as far as `is_meant` of node and topic.

@@ -393,20 +393,11 @@ const RATE: u8 = 32;
 const MEASURES: u8 = 64;
 
 /// The state that writer and reader share: the rows so far.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Memory {
     row: Row,
     /// The last whole numbers of the median, the gap, the rate, jitter and age.
     halves: [i64; 5],
-}
-
-impl Default for Memory {
-    fn default() -> Self {
-        Self {
-            row: Row::new(State::Active, Confidence::Measured),
-            halves: [0; 5],
-        }
-    }
 }
 
 /// A writer of the rows of an element in order of their windows.

@@ -2,22 +2,18 @@
 
 use crate::base::budget;
 use crate::base::error::{Error, Result};
-use crate::base::time::{Moment, Period, SECOND, Span, Stamp};
+use crate::base::time::{DAY, Moment, Period, SECOND, Span, Stamp};
 use crate::base::words::{self, worded};
 
-/// The periods for a bag shorter than five minutes, in milliseconds, the longest first.
-const SHORT: [i64; 9] = [30_000, 20_000, 10_000, 5000, 2000, 1000, 500, 200, 100];
-/// The periods for a bag longer than 600 minutes, in seconds, the shortest first.
-const LONG: [i64; 9] = [120, 300, 600, 1800, 3600, 7200, 21_600, 43_200, 86_400];
+/// The periods to choose from, in milliseconds, the shortest first: below a minute for a bag shorter than five minutes.
+const PERIODS: [i64; 19] = [
+    100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 30_000, 60_000, 120_000, 300_000, 600_000,
+    1_800_000, 3_600_000, 7_200_000, 21_600_000, 43_200_000, 86_400_000,
+];
 
-/// The periods for short bags in nanoseconds, the longest first.
-fn short() -> [i64; 9] {
-    SHORT.map(|millis| millis * (SECOND / 1000))
-}
-
-/// The periods for long bags in nanoseconds, the shortest first.
-fn long() -> [i64; 9] {
-    LONG.map(|seconds| seconds * SECOND)
+/// The periods to choose from, in nanoseconds, the shortest first.
+fn periods() -> impl DoubleEndedIterator<Item = i64> {
+    PERIODS.iter().map(|millis| millis * (SECOND / 1000))
 }
 
 /// The requested length of a window.
@@ -120,23 +116,20 @@ pub fn range(division: &Division, bag: Span) -> Result<Span> {
 pub fn default_period(nanos: i64) -> Period {
     let minute = 60 * SECOND;
     let chosen = if nanos < 5 * minute {
-        let short = short();
-        let enough = short.into_iter().find(|p| count(nanos, *p) >= 5);
-        enough.unwrap_or(short[8])
-    } else if count(nanos, minute) > budget::CHOSEN_WINDOWS {
-        let fits = |p: &i64| count(nanos, *p) <= budget::CHOSEN_WINDOWS;
-        let found = long().into_iter().find(fits);
-        found.unwrap_or_else(|| whole_days(nanos))
+        let mut short = periods().rev().filter(|p| *p < minute);
+        let enough = short.find(|p| count(nanos, *p) >= 5);
+        enough.unwrap_or(SECOND / 10)
     } else {
-        minute
+        let fits = |p: &i64| *p >= minute && count(nanos, *p) <= budget::CHOSEN_WINDOWS;
+        let found = periods().find(fits);
+        found.unwrap_or_else(|| whole_days(nanos))
     };
     Period::from_nanos(chosen).unwrap_or(MINUTE)
 }
 
 /// The fewest whole days that cover `nanos` with at most [`budget::CHOSEN_WINDOWS`] windows.
 fn whole_days(nanos: i64) -> i64 {
-    let day = long()[8];
-    count(count(nanos, day), budget::CHOSEN_WINDOWS) * day
+    count(count(nanos, DAY), budget::CHOSEN_WINDOWS) * DAY
 }
 
 const MINUTE: Period = match Period::from_nanos(60 * SECOND) {
@@ -177,13 +170,12 @@ pub fn divide(division: &Division, span: Span) -> Result<Windows> {
     }
     let starts = (0..many).map(|k| first.plus(k * step.nanos()));
     let end = |start: Stamp| start.plus(period.nanos()).min(span.end);
+    let spans = starts.map(|at| Span::new(at.max(span.start), end(at)));
     Ok(Windows {
         span,
         period,
         step,
-        spans: starts
-            .map(|at| Span::new(at.max(span.start), end(at)))
-            .collect(),
+        spans: spans.collect(),
     })
 }
 
@@ -226,8 +218,7 @@ fn first_start(division: &Division, span: Span, period: Period, step: Period) ->
 }
 
 fn too_many(many: i64, nanos: i64) -> Error {
-    let mut ladder = short().into_iter().rev().chain([60 * SECOND]).chain(long());
-    let enough = ladder.find(|p| count(nanos, *p) <= budget::WINDOWS);
+    let enough = periods().find(|p| count(nanos, *p) <= budget::WINDOWS);
     let enough = enough.unwrap_or_else(|| count(nanos, budget::WINDOWS));
     Error::usage(
         format!("{many} windows are more than {}", budget::WINDOWS),

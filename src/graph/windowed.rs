@@ -40,13 +40,12 @@ pub(crate) fn graphs(
     history: &History,
     windows: &[Span],
 ) -> Result<Windowed> {
-    let sorted = SortedWindows(windows);
-    let measures = WindowMeasures::new(recorded, findings, history, &sorted);
+    let measures = WindowMeasures::new(recorded, findings, history, windows);
     let mut all = GraphAssembly {
         measures: measures.map_err(spool_error)?,
         graphs: GraphsWriter::new(windows.to_vec()),
         messages: vec![0; windows.len()],
-        windows: sorted,
+        windows,
         findings,
         history,
         publishers: history.elements.wiring(|_, _| true).publishers,
@@ -77,13 +76,13 @@ struct GraphAssembly<'a> {
     measures: WindowMeasures,
     graphs: GraphsWriter,
     messages: Vec<u64>,
-    windows: SortedWindows<'a>,
+    windows: &'a [Span],
     findings: &'a Findings,
     history: &'a History,
     /// The known publishers of each topic.
     publishers: ById<TopicId, Vec<NodeId>>,
     /// The messages of each known publisher on each topic, in windows with any.
-    published: BTreeMap<(Name, Name), Column>,
+    published: BTreeMap<Element, Column>,
     /// The messages of each known publisher per window.
     sent: Few<Name, Vec<Sent>>,
 }
@@ -128,7 +127,7 @@ impl<'a> GraphAssembly<'a> {
             if streams.is_empty() {
                 continue;
             }
-            let sums = rates(recorded, streams, &self.windows)?;
+            let sums = rates(recorded, streams, self.windows)?;
             for sum in &sums {
                 self.messages[sum.window] += sum.arrivals.count;
             }
@@ -153,18 +152,13 @@ impl<'a> GraphAssembly<'a> {
         streams: &[usize],
         sums: &[Sums],
     ) -> io::Result<()> {
-        let mut of: Few<Name, Vec<usize>> = Few::default();
-        for stream in streams {
-            if let Some(node) = sender(&self.findings.streams[*stream]) {
-                of.grown(node).push(*stream);
-            }
-        }
-        for (node, own) in of.with_ids().filter(|(_, own)| !own.is_empty()) {
+        let sent = |at: &usize| Some((sender(&self.findings.streams[*at])?, *at));
+        for (node, own) in grouped(streams.iter().filter_map(sent)) {
             let read;
             let own = if own.len() == streams.len() {
                 sums
             } else {
-                read = rates(recorded, own, &self.windows)?;
+                read = rates(recorded, &own, self.windows)?;
                 &read
             };
             let many = self.windows.len();
@@ -172,19 +166,21 @@ impl<'a> GraphAssembly<'a> {
             sent.resize(many, Sent::default());
             let mut column = ColumnWriter::default();
             for sum in own {
-                sent[sum.window].add(&sum.arrivals, self.windows.0[sum.window]);
-                // Only topics show these two.
-                let (median, gap) = (Number::Unknown, Number::Unknown);
-                column.push(
-                    sum.window,
-                    Row {
-                        median,
-                        gap,
-                        ..sum.row
-                    },
-                );
+                sent[sum.window].add(&sum.arrivals, self.windows[sum.window]);
+                let row = Row {
+                    // Only topics show these two.
+                    median: Number::Unknown,
+                    gap: Number::Unknown,
+                    ..sum.row
+                };
+                column.push(sum.window, row);
             }
-            self.published.insert((node, topic), column.finish());
+            let history = self.history;
+            let (node, topic) = (history.node_ids.some(node), history.topic_ids.some(topic));
+            let ends = node.copied().zip(topic.copied());
+            let edge = ends.and_then(|ends| history.elements.published(ends));
+            self.published
+                .extend(edge.map(|edge| (edge, column.finish())));
         }
         Ok(())
     }
@@ -197,7 +193,7 @@ impl<'a> GraphAssembly<'a> {
         mut own: impl FnMut(&Self, usize) -> T,
         row: impl Fn(&mut Self, ElementWindow<'_>, T) -> Row,
     ) {
-        let (history, windows) = (self.history, self.windows.0);
+        let (history, windows) = (self.history, self.windows);
         let Some(record) = history.records.of(what) else {
             return;
         };
@@ -233,14 +229,11 @@ impl<'a> GraphAssembly<'a> {
             let lives = |life: Span| life.start < seen.window.end && seen.window.start < life.end;
             let has_sender = senders.is_empty() || senders.iter().any(|s| s.spans().any(lives));
             let measures = all.measures.of(what, seen.at);
-            let row = sum.map_or_else(
-                || Row {
-                    count: Some(0),
-                    bytes: sums.map(|_| 0),
-                    ..Row::default()
-                },
-                |sum| sum.row,
-            );
+            let none = Row {
+                count: Some(0),
+                bytes: sums.map(|_| 0),
+                ..Row::default()
+            };
             Row {
                 state: match seen.record.state(seen.window, sum.is_some()) {
                     State::Active if sum.is_none() && !has_sender => State::Silent,
@@ -249,7 +242,7 @@ impl<'a> GraphAssembly<'a> {
                 confidence: seen.confidence,
                 drops: measures.drops,
                 age: Number::of(measures.age_s),
-                ..row
+                ..sum.map_or(none, |sum| sum.row)
             }
         });
     }
@@ -292,17 +285,10 @@ impl<'a> GraphAssembly<'a> {
     }
 
     fn publishes(&mut self) {
-        // In the order of their ids.
-        let nodes = self.history.node_ids.somes().map(|(name, _)| name);
-        let nodes: ById<NodeId, Name> = nodes.collect();
-        let topics = self.history.topic_ids.somes().map(|(name, _)| name);
-        let topics: ById<TopicId, Name> = topics.collect();
         let (history, published) = (self.history, std::mem::take(&mut self.published));
-        for (id, edge) in history.elements.publishes.with_ids() {
+        for id in history.elements.publishes.ids() {
             let what = Element::Publish(id);
-            let ends = nodes.get(edge.node).zip(topics.get(edge.topic));
-            let sent = ends.and_then(|(node, topic)| published.get(&(*node, *topic)));
-            let mut sent = sent.map(Column::cursor);
+            let mut sent = published.get(&what).map(Column::cursor);
             let own = |_: &Self, _| sent.as_mut().map(ColumnCursor::next);
             self.element(what, own, |all, seen, row| {
                 let own = row.flatten();
@@ -381,7 +367,7 @@ impl WindowMeasures {
         recorded: &Recorded,
         findings: &Findings,
         history: &History,
-        windows: &SortedWindows<'_>,
+        windows: &[Span],
     ) -> io::Result<Self> {
         let mut all = Self::default();
         // The topics of each node besides housekeeping, for measurements that name none.
@@ -412,7 +398,7 @@ impl WindowMeasures {
                 let edge = node.and_then(|node| history.elements.publication(*node, *id));
                 recorded.facts.times.merge(&[*ages], |timed| {
                     let age = age_of(timed.size) as f64;
-                    for at in windows.over(timed.time, timed.time) {
+                    for at in over(windows, timed.time, timed.time) {
                         let edge = edge.map(Element::Publish);
                         for what in edge.into_iter().chain([Element::Topic(*id)]) {
                             let sum = all.0.entry((what, at)).or_default();
@@ -432,7 +418,7 @@ impl WindowMeasures {
         new: Span,
         subscribed: &ById<NodeId, Vec<TopicId>>,
         history: &History,
-        windows: &SortedWindows<'_>,
+        windows: &[Span],
     ) {
         let node = |name| history.node_ids.some(name).copied();
         let topic = match of.topic {
@@ -452,8 +438,8 @@ impl WindowMeasures {
         let to = to.and_then(|node| elements.subscription(topic, node));
         let ends = [from.map(Element::Publish), to.map(Element::Subscribe)];
         let whole = of.span.nanos().max(1) as f64;
-        for at in windows.over(new.start, new.end.plus(-1)) {
-            let window = windows.0[at];
+        for at in over(windows, new.start, new.end.plus(-1)) {
+            let window = windows[at];
             let shared = Span::new(new.start.max(window.start), new.end.min(window.end));
             let share = shared.nanos().max(0) as f64 / whole;
             for what in ends.into_iter().flatten().chain([Element::Topic(topic)]) {
@@ -595,7 +581,7 @@ pub(crate) fn counts(recorded: &Recorded, windows: &[Span]) -> Result<Vec<TopicC
     let mut all = Vec::new();
     for (topic, streams) in streams {
         let topic: Arc<str> = topic.into();
-        let sums = rates(recorded, &streams, &SortedWindows(windows)).map_err(spool_error)?;
+        let sums = rates(recorded, &streams, windows).map_err(spool_error)?;
         all.extend(sums.into_iter().map(|sum| TopicCount {
             topic: Arc::clone(&topic),
             window: sum.window,
@@ -619,11 +605,7 @@ struct OpenWindow {
 const MOST_GAPS: usize = 1 << 20;
 
 /// Counts the messages of some streams, those of a topic or of one of its publishers: each window with messages, in order.
-fn rates(
-    recorded: &Recorded,
-    streams: &[usize],
-    windows: &SortedWindows<'_>,
-) -> io::Result<Vec<Sums>> {
+fn rates(recorded: &Recorded, streams: &[usize], windows: &[Span]) -> io::Result<Vec<Sums>> {
     let ids: Vec<_> = streams.iter().map(|s| recorded.streams[*s].times).collect();
     let sized = ids.iter().all(|id| recorded.messages.sized(*id));
     let mut all = Vec::new();
@@ -634,9 +616,9 @@ fn rates(
         let time = timed.time;
         let ended = open.partition_point(|o| o.span.end <= time);
         all.extend(open.drain(..ended).map(|o| o.close(sized, Some(time))));
-        while windows.start(next).is_some_and(|start| start <= time) {
-            if time < windows.end(next) {
-                open.push_back(OpenWindow::new(next, windows.0[next], time, before));
+        while let Some(window) = windows.get(next).filter(|w| w.start <= time) {
+            if time < window.end {
+                open.push_back(OpenWindow::new(next, *window, time, before));
             }
             next += 1;
         }
@@ -729,31 +711,11 @@ fn median(gaps: &mut [i64]) -> Option<f64> {
     Some(f64::midpoint(lower, upper) / 1e9)
 }
 
-// Search for the windows that contain a moment or overlap an interval; windows may overlap.
-
-/// Windows sorted by start, none of them inside another.
-#[derive(Clone, Copy)]
-pub(crate) struct SortedWindows<'a>(pub(crate) &'a [Span]);
-
-impl SortedWindows<'_> {
-    pub(crate) fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    pub(crate) fn start(&self, window: usize) -> Option<Stamp> {
-        self.0.get(window).map(|w| w.start)
-    }
-
-    pub(crate) fn end(&self, window: usize) -> Stamp {
-        self.0.get(window).map_or(Stamp::MAX, |w| w.end)
-    }
-
-    /// The windows that overlap `[from, to]`.
-    pub(crate) fn over(&self, from: Stamp, to: Stamp) -> Range<usize> {
-        let first = self.0.partition_point(|w| w.end <= from);
-        let end = self.0.partition_point(|w| w.start <= to);
-        first..end.max(first)
-    }
+/// The windows that overlap `[from, to]`; they are sorted by start, none of them inside another, and may overlap each other.
+fn over(windows: &[Span], from: Stamp, to: Stamp) -> Range<usize> {
+    let first = windows.partition_point(|w| w.end <= from);
+    let end = windows.partition_point(|w| w.start <= to);
+    first..end.max(first)
 }
 
 #[cfg(test)]
@@ -831,12 +793,11 @@ mod tests {
 
         #[test]
         fn windows_are_half_open_and_may_overlap() {
-            let spans = spans(&[(0, 10), (5, 15), (10, 20)]);
-            let windows = SortedWindows(&spans);
-            assert_eq!(windows.over(Stamp(5), Stamp(5)), 0..2);
-            assert_eq!(windows.over(Stamp(10), Stamp(10)), 1..3);
-            assert_eq!(windows.over(Stamp(3), Stamp(4)), 0..1);
-            assert!(windows.over(Stamp(20), Stamp(30)).is_empty());
+            let windows = spans(&[(0, 10), (5, 15), (10, 20)]);
+            assert_eq!(over(&windows, Stamp(5), Stamp(5)), 0..2);
+            assert_eq!(over(&windows, Stamp(10), Stamp(10)), 1..3);
+            assert_eq!(over(&windows, Stamp(3), Stamp(4)), 0..1);
+            assert!(over(&windows, Stamp(20), Stamp(30)).is_empty());
         }
     }
 }

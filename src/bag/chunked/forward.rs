@@ -14,7 +14,7 @@ use crate::bag::adapters::Gather;
 use crate::bag::chunked::record::{Before, Visitor, next_chunk, next_record, records, unpack};
 use crate::bag::chunked::{HEAD, MOST_CHUNKS};
 use crate::bag::decompress::{Allowance, Compression};
-use crate::bag::input::closed;
+use crate::bag::input::{BagPlace, closed, head};
 use crate::bag::model::{ConnectionId, Growing, Growth, MOST_PAYLOAD, Sink, damaged};
 use crate::bag::source::{ByteStream, FAR, FileSource};
 use crate::base::error::{Error, Result};
@@ -170,7 +170,11 @@ impl<G: Grammar> Walk<G> {
                 _ => false,
             };
             if is_found {
-                forward.skipped(stream, from);
+                // The bytes from `from` on are not records.
+                let lost = stream.position() - from;
+                forward.damage(&format!(
+                    "skipped {lost} bytes at byte {from} that are not records"
+                ));
             } else {
                 step?;
             }
@@ -274,7 +278,7 @@ impl<G: Grammar> Forward<'_, G> {
             }
             RecordKind::FileEnd(crc) => self.file_end(stream, len, crc),
             RecordKind::Unknown { extension } => {
-                self.walk.found_messages.interrupt();
+                self.walk.found_messages.interrupted = true;
                 let text = "records of a kind that the format does not define were skipped";
                 if extension {
                     self.sink.notice(Notice::new(NoticeKind::Note, text));
@@ -284,7 +288,7 @@ impl<G: Grammar> Forward<'_, G> {
                 pass(stream, len)
             }
             RecordKind::Other | RecordKind::Tail => {
-                self.walk.found_messages.interrupt();
+                self.walk.found_messages.interrupted = true;
                 pass(stream, len)
             }
         }
@@ -312,14 +316,6 @@ impl<G: Grammar> Forward<'_, G> {
             "unexpected data at byte {at} instead of the end of the bag"
         ));
         Ok(())
-    }
-
-    /// Reports the bytes from `from` on, which are not records.
-    fn skipped(&mut self, stream: &ByteStream<'_>, from: u64) {
-        let lost = stream.position() - from;
-        self.damage(&format!(
-            "skipped {lost} bytes at byte {from} that are not records"
-        ));
     }
 
     /// Reads a chunk whose record began at byte `from`.
@@ -399,7 +395,7 @@ impl<G: Grammar> Forward<'_, G> {
 
     /// Reports the messages of the last chunk, once everything after it has been read.
     fn report_chunk(&mut self) {
-        if self.walk.found_messages.is_misdated() {
+        if std::mem::take(&mut self.walk.found_messages.misdated) {
             self.damage(OTHER_TIMES);
         }
         let (mended, surplus) = self.walk.found_messages.report_all(self.sink);
@@ -460,7 +456,13 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
         what: &G::Description,
         len: u64,
     ) -> Result<(), NoRecord> {
-        let new = self.walk.announced.read(stream, (what, len), self.sink)?;
+        if len > MOST_PAYLOAD as u64 {
+            // Too long to be one.
+            return pass(stream, len);
+        }
+        let data = peek_whole(stream, len)?;
+        let new = self.walk.announced.describe(what, data, self.sink);
+        pass(stream, len)?;
         let Ok(new) = new else {
             self.damage("the description of a connection cannot be read");
             return Ok(());
@@ -567,11 +569,6 @@ impl ChunkMessages {
         }
     }
 
-    /// Records that another record than its index followed the chunk.
-    fn interrupt(&mut self) {
-        self.interrupted = true;
-    }
-
     /// Passes on what was found so far, unless the index may be needed instead.
     fn spill(&mut self, sink: &mut dyn Sink) {
         if !self.doubtful {
@@ -596,11 +593,6 @@ impl ChunkMessages {
         } else if is_needed && is_whole {
             self.behind.push(record);
         }
-    }
-
-    /// Whether the index states other times than the messages of the chunk have.
-    fn is_misdated(&mut self) -> bool {
-        std::mem::take(&mut self.misdated)
     }
 
     /// Reports all messages to `sink`; returns how many were only in the index, and how many only in the chunk. If the
@@ -649,10 +641,8 @@ const BEHIND: u64 = 64;
 
 /// Follows a bag of this grammar.
 pub(crate) fn follow<G: Grammar>(path: &Path) -> Result<Box<dyn Growing>> {
-    let source = FileSource::open(path)?;
-    let mut head = [0; HEAD];
-    let got = source.read_at(0, &mut head);
-    G::accept(path, &head[..got.map_err(Error::io("read", path))?])?;
+    let mut place = BagPlace::File(FileSource::open(path)?);
+    G::accept(path, &head(&mut place, HEAD)?)?;
     Ok(Box::new(GrowingChunks::<G> {
         path: path.to_owned(),
         at: 0,
@@ -689,7 +679,7 @@ impl<G: Grammar> Growing for GrowingChunks<G> {
             });
         }
         let plan = G::plan(&source).map_err(fail())?;
-        self.is_closed = plan.is_ok() || G::is_ended(&source);
+        self.is_closed = plan.is_ok() || G::stated_sum(&source).is_some();
         self.len = len;
         let mut stream = ByteStream::of_file(&source, self.at, len, FAR);
         if self.at == 0 {
@@ -700,9 +690,7 @@ impl<G: Grammar> Growing for GrowingChunks<G> {
         if self.is_closed {
             std::mem::take(&mut self.walk).finish(&stop, at, sink);
         }
-        self.behind = self
-            .last_bytes(&source)
-            .map_err(Error::io("read", &self.path))?;
+        self.behind = self.last_bytes(&source).map_err(fail())?;
         Ok(Growth::More)
     }
 

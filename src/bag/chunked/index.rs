@@ -6,10 +6,10 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::Grammar;
-use super::record::{Connections, MessageHead, RecordKind};
+use super::record::{MessageHead, RecordKind};
 use crate::bag::adapters::{Gather, MOST_CUTS};
-use crate::bag::chunked::Chunk;
 use crate::bag::chunked::record::{NoRecord, Visitor, next_chunk, unpack};
+use crate::bag::chunked::{Chunk, ChunkPlan};
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want, damaged, lost};
 use crate::bag::source::{ByteStream, FAR, FileSource, GLANCE, NEAR};
@@ -149,12 +149,10 @@ impl ChunkBody {
 pub(super) struct Query<'a, G> {
     pub(super) source: &'a FileSource,
     pub(super) allowance: Arc<Allowance>,
-    pub(super) connections: &'a Connections,
+    pub(super) plan: &'a ChunkPlan,
     /// The wanted part of each message, by connection.
     pub(super) wants: &'a [Want],
     pub(super) range: Option<Span>,
-    /// The position after the last chunk and its index.
-    pub(super) tail: u64,
     pub(super) grammar: PhantomData<fn() -> G>,
 }
 
@@ -175,7 +173,7 @@ impl<G: Grammar> Query<'_, G> {
                 if entries.is_empty() {
                     continue;
                 }
-                let Some(id) = self.connections.get(*raw) else {
+                let Some(id) = self.plan.connections.get(*raw) else {
                     nameless(sink, entries.len() as u64);
                     continue;
                 };
@@ -193,7 +191,7 @@ impl<G: Grammar> Query<'_, G> {
     fn wanted(&self, index: &Index) -> Vec<Wanted> {
         let mut all = Vec::new();
         for (run, (raw, entries)) in index.runs.iter().enumerate() {
-            let want = self.connections.get(*raw);
+            let want = self.plan.connections.get(*raw);
             let want = want.map_or(Want::Stamps, |id| self.wants[id.0 as usize]);
             if want == Want::Stamps {
                 continue;
@@ -259,7 +257,7 @@ impl<G: Grammar> Query<'_, G> {
             RecordKind::Message(head) if head.raw == expected => head.size,
             _ => return None,
         };
-        let connection = self.connections.get(expected)?;
+        let connection = self.plan.connections.get(expected)?;
         let want = self.wants[connection.0 as usize];
         if let Some(data) = wanted_part(stream, size, want, sink).ok()? {
             sink.message(Message {
@@ -302,11 +300,8 @@ pub(crate) fn nameless(sink: &mut dyn Sink, count: u64) {
 
 /// Reports messages that only the index has.
 pub(super) fn absent(sink: &mut dyn Sink, count: u64) {
-    damaged(
-        sink,
-        count,
-        "messages are in the index but not in their chunk",
-    );
+    let text = "messages are in the index but not in their chunk";
+    damaged(sink, count, text);
 }
 
 /// Passes on the wanted part of the message at the position of `stream`, and skips it.
@@ -390,11 +385,8 @@ impl<G: Grammar> Query<'_, G> {
         let times = (chunk.first, chunk.last);
         let found = found.filter(|found| found.index.times().is_none_or(|own| spans(own, times)));
         let Some(found) = found else {
-            damaged(
-                sink,
-                1,
-                "chunks were read whole, since their index is missing or wrong",
-            );
+            let text = "chunks were read whole, since their index is missing or wrong";
+            damaged(sink, 1, text);
             let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, FAR);
             self.walked(&mut stream, Share::Whole, sink);
             return self.unnamed(chunk, sink);
@@ -411,23 +403,19 @@ impl<G: Grammar> Query<'_, G> {
 
     /// Reads the chunks after `chunk` that the tail does not list.
     fn unnamed(&self, chunk: &Chunk, sink: &mut dyn Sink) {
-        let Ok(Some(body)) = self.body(chunk) else {
+        let Ok(Some(body)) = self.body(chunk.start, chunk.end) else {
             return;
         };
-        let mut stream = ByteStream::of_file(self.source, body.range.end, self.tail, FAR);
+        let tail = self.plan.body.end;
+        let mut stream = ByteStream::of_file(self.source, body.range.end, tail, FAR);
         let mut from = chunk.start;
         while next_chunk::<G>(&mut stream, from) && stream.position() < chunk.end {
             damaged(sink, 1, "chunks that the index does not list were read");
             from = stream.position();
-            let here = Chunk {
-                start: from,
-                end: self.tail,
-                ..chunk.clone()
-            };
-            let body = self.body(&here).ok().flatten();
-            if chunk.end < self.tail && body.is_some_and(|body| body.range.end > chunk.end) {
+            let body = self.body(from, tail).ok().flatten();
+            if chunk.end < tail && body.is_some_and(|body| body.range.end > chunk.end) {
                 // The next listed chunk, listed at a wrong position: its index is found there, its messages here.
-                let mut stream = ByteStream::of_file(self.source, here.start, here.end, FAR);
+                let mut stream = ByteStream::of_file(self.source, from, tail, FAR);
                 return self.walked(&mut stream, Share::Payloads, sink);
             }
             self.walked(&mut stream, Share::Whole, sink);
@@ -440,7 +428,7 @@ impl<G: Grammar> Query<'_, G> {
         if len > LONGEST_INDEX {
             return Ok(None);
         }
-        let body = self.body(chunk)?;
+        let body = self.body(chunk.start, chunk.end)?;
         let behind = body.as_ref().map(|body| body.range.end);
         let expected = || self.index_at(chunk.index.start, len, promised);
         // Bytes between a chunk and its index belong to neither.
@@ -476,9 +464,9 @@ impl<G: Grammar> Query<'_, G> {
         Ok(G::index(&bytes[..got], promised))
     }
 
-    /// The chunk's compression and the position of its body.
-    pub(super) fn body(&self, chunk: &Chunk) -> io::Result<Option<ChunkBody>> {
-        let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, GLANCE);
+    /// The compression of the chunk at byte `start` and the position of its body, which ends at byte `end` at the latest.
+    pub(super) fn body(&self, start: u64, end: u64) -> io::Result<Option<ChunkBody>> {
+        let mut stream = ByteStream::of_file(self.source, start, end, GLANCE);
         let head = match G::next(&mut stream).map(|next| next.kind) {
             Ok(RecordKind::Chunk(head)) => head,
             Err(NoRecord::Io(e)) => return Err(e),
@@ -486,7 +474,7 @@ impl<G: Grammar> Query<'_, G> {
         };
         let start = stream.position();
         let range = start..start.saturating_add(head.packed);
-        let how = head.how.filter(|_| range.end <= chunk.end);
+        let how = head.how.filter(|_| range.end <= end);
         Ok(how.map(|how| ChunkBody { how, range }))
     }
 
@@ -494,11 +482,7 @@ impl<G: Grammar> Query<'_, G> {
     fn moved(&self, chunk: &Chunk) -> Option<ChunkBody> {
         let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, FAR);
         let start = next_chunk::<G>(&mut stream, chunk.start).then(|| stream.position())?;
-        let here = Chunk {
-            start,
-            ..chunk.clone()
-        };
-        self.body(&here).ok().flatten()
+        self.body(start, chunk.end).ok().flatten()
     }
 
     /// Reports the chunk at the position of `stream` to `sink`, record by record, and damage in it.
@@ -572,7 +556,7 @@ struct ChunkWalk<'a, 's, G> {
 
 impl<G: Grammar> Visitor<G> for ChunkWalk<'_, '_, G> {
     fn message(&mut self, stream: &mut ByteStream<'_>, head: MessageHead) -> Result<(), NoRecord> {
-        let Some(id) = self.query.connections.get(head.raw) else {
+        let Some(id) = self.query.plan.connections.get(head.raw) else {
             nameless(self.sink, 1);
             return super::record::pass(stream, u64::from(head.size));
         };

@@ -77,7 +77,7 @@ pub(crate) struct Counts {
 }
 
 /// The head of a chunk, before its records.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct ChunkHead {
     /// `None` for an unknown compression.
     pub(crate) how: Option<Compression>,
@@ -216,22 +216,6 @@ impl<G: Grammar> Announced<G> {
     pub(crate) fn get(&self, raw: u32) -> Option<(ConnectionId, Want)> {
         let id = self.connections.get(raw)?;
         Some((id, self.wants[id.0 as usize]))
-    }
-
-    /// As [`Announced::describe`], for a description of `len` bytes that follows in `stream`; one that is too long to be
-    /// one is ignored. The outer error is that of the stream.
-    pub(crate) fn read(
-        &mut self,
-        stream: &mut ByteStream<'_>,
-        (what, len): (&G::Description, u64),
-        sink: &mut dyn Sink,
-    ) -> Result<Result<Option<(u32, ConnectionId)>, NoRecord>, NoRecord> {
-        let new = if len > MOST_PAYLOAD as u64 {
-            Ok(None)
-        } else {
-            self.describe(what, peek_whole(stream, len)?, sink)
-        };
-        pass(stream, len).map(|()| new)
     }
 
     /// Announces a connection that the bag calls `raw` and does not describe.

@@ -233,18 +233,16 @@ pub(super) fn chunk(stream: &mut ByteStream<'_>, len: u64) -> Result<ChunkHead, 
     let room = len.checked_sub(skip as u64).ok_or(NoRecord::Broken)?;
     stream.advance(skip);
     let packed = packed.min(room);
+    let behind = room - packed;
     Ok(ChunkHead {
         how,
         packed,
-        padding: Some(room - packed)
-            .filter(|_| is_extended(packed, room))
-            .unwrap_or(0),
+        padding: if is_extended(packed, room) { behind } else { 0 },
         plain,
         crc: (crc != 0).then_some(crc),
         // An empty chunk has zeros.
         times: (times.0 <= times.1 && times.1 > Stamp(0)).then_some(times),
-        misnamed: false,
-        unclosed: false,
+        ..ChunkHead::default()
     })
 }
 

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::{Described, Rosbag1};
-use crate::bag::chunked::{ChunkHead, Counts, MessageHead, NoRecord, RecordHead, RecordKind};
+use super::Rosbag1;
+use crate::bag::chunked::NoRecord;
 use crate::bag::decompress::Compression;
 use crate::bag::model::Connection;
 use crate::bag::source::ByteStream;
@@ -21,7 +21,8 @@ pub(super) enum Header {
         encryptor: String,
     },
     Chunk {
-        compression: Vec<u8>,
+        /// `None` for an unknown compression.
+        how: Option<Compression>,
         size: u32,
     },
     Connection {
@@ -48,49 +49,6 @@ pub(super) enum Header {
 
 /// The longest header that is accepted, in bytes; real ones stay below 300.
 const LONGEST_HEADER: usize = 1 << 20;
-
-/// Takes the head of the next record.
-pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>, NoRecord> {
-    let (header, size) = header(stream)?;
-    let mut len = u64::from(size);
-    let kind = match header {
-        Header::Chunk { compression, size } => RecordKind::Chunk(chunk(&compression, size, len)),
-        Header::Message { raw, time } => RecordKind::Message(MessageHead { raw, time, size }),
-        Header::Connection { raw, topic } => RecordKind::Description(Described { raw, topic }),
-        Header::Index { raw, count } => {
-            // Its length is computed from its count: writers of 2010 stored a wrong one.
-            len = u64::from(count.checked_mul(ENTRY).ok_or(NoRecord::Broken)?);
-            RecordKind::Index { raw, count }
-        }
-        Header::Bag { chunks, .. } => RecordKind::Total(Counts {
-            chunks,
-            ..Counts::default()
-        }),
-        Header::ChunkInfo {
-            pos, start, end, ..
-        } => RecordKind::Listed {
-            at: pos,
-            times: (start, end),
-        },
-        Header::Unknown => RecordKind::Unknown { extension: false },
-    };
-    Ok(RecordHead { kind, len })
-}
-
-/// The head of a chunk. A recorder writes the lengths when it closes the chunk.
-fn chunk(compression: &[u8], size: u32, len: u64) -> ChunkHead {
-    let how = Compression::named(compression);
-    ChunkHead {
-        how,
-        packed: len,
-        padding: 0,
-        plain: u64::from(size),
-        crc: None,
-        times: None,
-        misnamed: false,
-        unclosed: len == 0 && how.is_some_and(|how| how != Compression::None),
-    }
-}
 
 /// Takes the header of the next record, and the stated length of the data that follows in `stream`.
 pub(super) fn header(stream: &mut ByteStream<'_>) -> Result<(Header, u32), NoRecord> {
@@ -165,7 +123,7 @@ fn record(header: &[u8]) -> Option<Header> {
             count: number("count")?,
         },
         5 => Header::Chunk {
-            compression: value("compression")?.to_vec(),
+            how: Compression::named(value("compression")?),
             size: number("size")?,
         },
         6 if is_version_1() => Header::ChunkInfo {

@@ -7,7 +7,7 @@ use rosbag::{ChunkRecord, IndexRecord, MessageRecord, RosBag};
 use super::records::{self, ENTRY, Header};
 use super::{Described, Rosbag1};
 use crate::bag::chunked::{ChunkBody, ChunkPlan, NoRecord, SecondFinds, SecondReading, pass, walk};
-use crate::bag::decompress::{Allowance, Compression};
+use crate::bag::decompress::Allowance;
 use crate::bag::model::Sink;
 use crate::bag::source::{ByteStream, FAR, FileSource};
 use crate::base::digest::hex_of;
@@ -46,14 +46,17 @@ fn bound(
         let start = stream.position();
         pass(stream, u64::from(len))?;
         let found = match header {
-            Header::Chunk { compression, size } => match Compression::named(&compression) {
-                Some(how) => {
-                    verified.compression.insert(how);
-                    let range = start..start + u64::from(len);
-                    bound_chunk(source, &ChunkBody { how, range }, size, &allowance)
-                }
-                None => Err("a chunk is compressed in an unknown way".to_owned()),
-            },
+            Header::Chunk { how: None, .. } => {
+                Err("a chunk is compressed in an unknown way".to_owned())
+            }
+            Header::Chunk {
+                how: Some(how),
+                size,
+            } => {
+                verified.compression.insert(how);
+                let range = start..start + u64::from(len);
+                bound_chunk(source, &ChunkBody { how, range }, size, &allowance)
+            }
             Header::Index { count, .. } if count.checked_mul(ENTRY) == Some(len) => Ok(()),
             _ => Err("a record among the chunks is of an unexpected kind".to_owned()),
         };

@@ -110,11 +110,10 @@ impl Db {
     pub(super) fn first<T>(
         &self,
         sql: &str,
-        args: &[i64],
         pick: impl Fn(&QueryRow<'_>) -> Option<T>,
     ) -> Result<Option<T>, Refusal> {
         let mut picked = None;
-        self.each(sql, args, |row| {
+        self.each(sql, &[], |row| {
             picked = pick(row);
             ControlFlow::Break(())
         })?;
@@ -160,11 +159,9 @@ const LARGEST_COPY: u64 = 16 << 30;
 
 /// Copies a database with its newest rows in a log or journal beside it that was never merged.
 pub(super) fn ready(path: &Path) -> Result<Ready> {
-    let beside: Vec<PathBuf> = ["-wal", "-journal"]
-        .iter()
-        .map(|end| with_suffix(path, end))
-        .filter(|p| p.metadata().is_ok_and(|m| m.is_file() && m.len() > 0))
-        .collect();
+    let is_filled = |p: &PathBuf| p.metadata().is_ok_and(|m| m.is_file() && m.len() > 0);
+    let beside = ["-wal", "-journal"].map(|end| with_suffix(path, end));
+    let beside: Vec<PathBuf> = beside.into_iter().filter(is_filled).collect();
     let mut ready = Ready::growing(path, false);
     if beside.is_empty() {
         return Ok(ready);

@@ -186,10 +186,8 @@ impl<'a> RowReader<'a> {
         gather: &mut Gather,
         sink: &mut dyn Sink,
     ) {
-        let stored = row
-            .integer(3)
-            .and_then(|n| u32::try_from(n).ok())
-            .unwrap_or(0);
+        let stored = row.integer(3).and_then(|n| u32::try_from(n).ok());
+        let stored = stored.unwrap_or(0);
         let want = self.wants[id.0 as usize];
         if want == Want::Stamps || want == Want::Sizes && !self.bag.packed {
             return gather.add(id, time, stored, sink);
@@ -208,10 +206,8 @@ impl<'a> RowReader<'a> {
 /// The condition in SQL for rows whose payloads are wanted.
 fn wanted(bag: &Sqlite3Bag, wants: &[Want]) -> String {
     let wanted = |want: Want| want > Want::Sizes || bag.packed && want == Want::Sizes;
-    let ids = bag
-        .ids
-        .iter()
-        .filter(|(_, id)| wanted(wants[id.0 as usize]));
+    let ids = bag.ids.iter();
+    let ids = ids.filter(|(_, id)| wanted(wants[id.0 as usize]));
     let mut ids: Vec<String> = ids.map(|(raw, _)| raw.to_string()).collect();
     ids.sort_unstable();
     match (bag.verify, ids.is_empty()) {

@@ -167,8 +167,8 @@ fn live_like(
 /// A period of existence, both ends included; it never ends before it begins.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Lifetime {
-    from: Stamp,
-    to: Stamp,
+    pub(crate) from: Stamp,
+    pub(crate) to: Stamp,
     /// The first sign of it.
     pub(crate) sign: Stamp,
     pub(crate) began: Option<Bound>,
@@ -185,14 +185,6 @@ impl Lifetime {
             began: None,
             ended: None,
         }
-    }
-
-    pub(crate) fn from(&self) -> Stamp {
-        self.from
-    }
-
-    pub(crate) fn to(&self) -> Stamp {
-        self.to
     }
 
     /// Sets the beginning, which is not after the end.
@@ -320,7 +312,8 @@ pub(crate) enum Extent {
 #[derive(Clone, Copy)]
 pub(crate) struct Pulse {
     first: Stamp,
-    last: Stamp,
+    /// The time of the last message.
+    pub(crate) last: Stamp,
     /// The time between two messages, in nanoseconds.
     period: i64,
     /// The longest pause between two stretches, in nanoseconds; 0 for none.
@@ -356,11 +349,6 @@ impl Pulse {
         })
     }
 
-    /// The time of the last message.
-    pub(crate) fn last(&self) -> Stamp {
-        self.last
-    }
-
     /// Whether the silence at the end is too long for the rhythm.
     pub(crate) fn broke_off(&self, end: Stamp) -> bool {
         self.silence(self.last, end) > self.patience()
@@ -373,8 +361,9 @@ impl Pulse {
 
     /// The longest insignificant silence, in nanoseconds.
     fn patience(&self) -> i64 {
-        self.period
-            .saturating_mul(if self.is_even { BREAK } else { BREAK * UNUSUAL })
+        let times = if self.is_even { BREAK } else { BREAK * UNUSUAL };
+        let silence = self.period.saturating_mul(times);
+        silence
             .max(self.pause.saturating_mul(UNUSUAL))
             .max(BREAK_NS)
     }
@@ -536,16 +525,14 @@ impl Liveness {
         let (start, recorded) = recording.unwrap_or(mission);
         let end = self.end(recorded.min(mission.1), is_node);
         if let Some(life) = lives.last_mut().filter(|life| life.ended.is_none()) {
-            let ended = end.filter(|end| end.time >= life.from());
+            let ended = end.filter(|end| end.time >= life.from);
             life.end_at(ended.map_or(mission.1, |end| end.time), ended);
         }
         if let Some(life) = lives.first_mut() {
             let pulses = self.pulses().iter();
-            let rhythm = pulses.filter(|p| p.first.since(life.from()) <= DISCOVERY_NS);
-            let is_found = self
-                .found
-                .iter()
-                .any(|found| found.since(life.from()).abs() <= DISCOVERY_NS);
+            let rhythm = pulses.filter(|p| p.first.since(life.from) <= DISCOVERY_NS);
+            let is_close = |found: &Stamp| found.since(life.from).abs() <= DISCOVERY_NS;
+            let is_found = self.found.iter().any(is_close);
             let period = rhythm.map(|p| p.period).chain(is_found.then_some(0)).min();
             let is_absent = |began: Bound| began.earliest > Stamp::MIN;
             let is_near = |begin: &Stamp| begin.since(life.sign).abs() <= ADVERTISED_NS;
@@ -605,13 +592,13 @@ impl Liveness {
         let mut all = std::mem::take(Rc::make_mut(&mut self.lives));
         let joined = Rc::make_mut(&mut self.lives);
         all.extend(edges);
-        all.sort_by_key(|life| (life.from(), life.to()));
+        all.sort_by_key(|life| (life.from, life.to));
         for life in all {
             match joined.last_mut() {
-                Some(last) if life.from() <= last.to().plus(1) => {
-                    if life.to() > last.to() {
-                        last.end_at(life.to(), life.ended);
-                    } else if life.to() == last.to() && life.ended.is_none() {
+                Some(last) if life.from <= last.to.plus(1) => {
+                    if life.to > last.to {
+                        last.end_at(life.to, life.ended);
+                    } else if life.to == last.to && life.ended.is_none() {
                         last.ended = None;
                     }
                 }
@@ -658,22 +645,22 @@ impl Liveness {
         }
         let mut own = Vec::new();
         for around in node.iter() {
-            let from = self.signs.partition_point(|s| *s < around.from());
-            let to = self.signs.partition_point(|s| *s <= around.to());
+            let from = self.signs.partition_point(|s| *s < around.from);
+            let to = self.signs.partition_point(|s| *s <= around.to);
             let mut inside = lives(&self.signs[from..to], &self.ends);
             if let Some(first) = inside.first_mut() {
-                let next = self.ends.partition_point(|end| *end < first.from());
+                let next = self.ends.partition_point(|end| *end < first.from);
                 let absent = next.checked_sub(1).map(|at| self.ends[at].plus(1));
-                let absent = absent.filter(|at| *at > around.from());
-                let stated = self.stated.binary_search(&first.from()).is_ok();
-                let dated = absent.is_some() && self.counted.contains(&first.from());
+                let absent = absent.filter(|at| *at > around.from);
+                let stated = self.stated.binary_search(&first.from).is_ok();
+                let dated = absent.is_some() && self.counted.contains(&first.from);
                 let due = self.messages.as_ref().and_then(|m| m.due);
-                let is_due = around.began.is_none() && due.is_some_and(|due| first.from() <= due);
+                let is_due = around.began.is_none() && due.is_some_and(|due| first.from <= due);
                 first.begin_within(around, absent, stated && !dated, is_due);
             }
             if let Some(last) = inside.last_mut().filter(|l| l.ended.is_none()) {
-                let end = self.end(around.to(), false).filter(|_| !self.lasts);
-                let to = end.map_or(around.to(), |end| end.time.max(last.to()));
+                let end = self.end(around.to, false).filter(|_| !self.lasts);
+                let to = end.map_or(around.to, |end| end.time.max(last.to));
                 last.end_at(to, end.or(around.ended));
             }
             if own.is_empty() {
@@ -698,17 +685,17 @@ impl Liveness {
         let mut is_earlier = false;
         let mut until = Stamp::MIN;
         for life in Rc::make_mut(&mut self.lives) {
-            let around = |o: &&Lifetime| o.from() < life.from() && life.from() <= o.to();
+            let around = |o: &&Lifetime| o.from < life.from && life.from <= o.to;
             let is_absent = |from: Stamp| {
                 let mut ends = self.ends.iter();
-                ends.any(|end| from <= *end && *end < life.from())
+                ends.any(|end| from <= *end && *end < life.from)
             };
-            let other = others.iter().find(around).filter(|o| until < o.from());
-            if let Some(other) = other.filter(|other| !is_absent(other.from())) {
-                life.begin_at(other.from(), other.began);
+            let other = others.iter().find(around).filter(|o| until < o.from);
+            if let Some(other) = other.filter(|other| !is_absent(other.from)) {
+                life.begin_at(other.from, other.began);
                 is_earlier = true;
             }
-            until = life.to();
+            until = life.to;
         }
         is_earlier
     }
@@ -803,7 +790,7 @@ mod tests {
                 edge.sign_all(&[stamp(30), stamp(60)], &[stamp(10)]);
                 edge.counted = counted;
                 edge.live_within(&vec![Lifetime::whole((stamp(0), stamp(90)))].into());
-                edge.lives[0].from()
+                edge.lives[0].from
             };
             assert_eq!(began(Vec::new()), stamp(10).plus(1));
             assert_eq!(began(vec![stamp(30)]), stamp(30));

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
-use crate::base::ids::Few;
+use crate::base::ids::grouped;
 use crate::base::name::{is_feedback, is_log, lies_in, role, start};
 use crate::base::rhythm::{CROWD_NS, FOUND_NS, TOGETHER_NS, broken_after};
 use crate::base::time::{Span, Stamp};
@@ -47,7 +47,8 @@ pub(crate) fn collect(
         let own = node.map_or(&[][..], |node| restarts.of(node));
         let deaths: Vec<Stamp> = own.iter().map(|r| r.death).collect();
         let liveness = liveness_of.entry(inference.what).or_default();
-        liveness.lasts |= lasts(&inference.when);
+        // It is still valid after its last sign.
+        liveness.lasts |= !matches!(inference.when, Validity::Moments(_) | Validity::Like(_));
         liveness.evidence = liveness.evidence.and(Evidence::row(inference.source));
         let confidence = confidence(&inference, findings, traffic);
         liveness.confidence = liveness.confidence.min(confidence);
@@ -57,11 +58,11 @@ pub(crate) fn collect(
                 let Some(senders) = traffic.some(stream.topic) else {
                     continue;
                 };
+                let place = senders.place(*at).unwrap_or(0);
                 // The messages of its sender may all be in another bag.
-                if senders.is_empty_among_others(*at) {
+                if senders.is_empty_among_others(place) {
                     continue;
                 }
-                let place = senders.place(*at).unwrap_or(0);
                 let (with_start, with_end) = with_input(Some(stream.topic));
                 let name = stream.connection.topic.as_str();
                 let is_free = is_log(name) || is_feedback(name);
@@ -143,9 +144,8 @@ fn add_restarts(liveness_of: &mut LivenessOf, restarts: &Restarts) {
         for restart in restarts {
             let liveness = liveness_of.entry(ElementKey::Node(node)).or_default();
             let seen = restart.is_timed().then_some(restart.death);
-            liveness
-                .signs
-                .extend(seen.into_iter().chain([restart.birth]));
+            liveness.signs.extend(seen);
+            liveness.signs.push(restart.birth);
             liveness.ends.push(restart.death);
         }
     }
@@ -256,11 +256,6 @@ fn is_from(inference: &Inference, source: &str) -> bool {
     source_word(inference.source) == source
 }
 
-/// Whether an inference is still valid after its last sign.
-fn lasts(when: &Validity) -> bool {
-    !matches!(when, Validity::Moments(_) | Validity::Like(_))
-}
-
 /// Both lists of times as one, sorted.
 fn together(a: &[Stamp], b: &[Stamp]) -> Vec<Stamp> {
     let mut all = [a, b].concat();
@@ -334,11 +329,11 @@ pub(crate) fn fall_silent(
     findings: &Findings,
     pauses: &[Span],
 ) {
-    for (topic, nodes) in publishers(liveness_of).with_ids() {
+    for (topic, nodes) in publishers(liveness_of) {
         let Some(sender) = merged(traffic, findings, topic) else {
             continue;
         };
-        for (node, stretches) in by_publisher(nodes, sender, findings) {
+        for (node, stretches) in by_publisher(&nodes, sender, findings) {
             let Some(liveness) = liveness_of.get_mut(&ElementKey::Publish(node, topic)) else {
                 continue;
             };
@@ -348,8 +343,8 @@ pub(crate) fn fall_silent(
             let pulse = Pulse::of(stretches, &[], pauses, sender.recording.1);
             let pulse = pulse.filter(|pulse| pulse.broke_off(findings.mission.1));
             if let Some(pulse) = pulse {
-                liveness.signs.push(pulse.last());
-                liveness.last_sign = liveness.last_sign.max(Some(pulse.last()));
+                liveness.signs.push(pulse.last);
+                liveness.last_sign = liveness.last_sign.max(Some(pulse.last));
                 liveness.messages().pulses.push(pulse);
             }
         }
@@ -357,14 +352,12 @@ pub(crate) fn fall_silent(
 }
 
 /// The known publishers of each topic.
-fn publishers(liveness_of: &LivenessOf) -> Few<Name, Vec<Name>> {
-    let mut all: Few<Name, Vec<Name>> = Few::default();
-    for what in liveness_of.keys() {
-        if let ElementKey::Publish(node, topic) = what {
-            all.grown(*topic).push(*node);
-        }
-    }
-    all
+fn publishers(liveness_of: &LivenessOf) -> BTreeMap<Name, Vec<Name>> {
+    let nodes = liveness_of.keys().filter_map(|what| match what {
+        ElementKey::Publish(node, topic) => Some((*topic, *node)),
+        _ => None,
+    });
+    grouped(nodes)
 }
 
 /// The sender that represents all senders of a merged topic, unless messages are latched.

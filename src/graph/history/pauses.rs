@@ -37,20 +37,16 @@ impl SendingNode<'_> {
     fn begins_in(&self, gap: Span) -> bool {
         let edge = gap.nanos() / 8;
         let inside = gap.start.plus(edge)..gap.end.plus(-edge);
-        self.sender
-            .stretches
-            .iter()
-            .any(|s| inside.contains(&s.first))
+        let mut stretches = self.sender.stretches.iter();
+        stretches.any(|s| inside.contains(&s.first))
     }
 
     /// The gap that begins around a moment, give or take `near` nanoseconds: the last message and the next one.
     fn gap(&self, at: Stamp, near: i64) -> Option<(Stamp, Option<Stamp>)> {
-        let place = self
-            .sender
-            .stretches
-            .partition_point(|s| s.last < at.plus(-near));
-        let last = self.sender.stretches.get(place)?.last;
-        let next = self.sender.stretches.get(place + 1);
+        let all = &self.sender.stretches;
+        let place = all.partition_point(|s| s.last < at.plus(-near));
+        let last = all.get(place)?.last;
+        let next = all.get(place + 1);
         let is_gap = next.is_none_or(|next| !next.is_joined) && last.since(at) <= near;
         is_gap.then(|| (last, next.map(|next| next.first)))
     }
@@ -116,21 +112,12 @@ pub(crate) fn pauses(
 fn clock_jumps(traffic: &Traffic) -> Vec<Span> {
     let senders = traffic.iter().flatten().flat_map(|of| &of.list);
     let stretches = senders.flat_map(|sender| &sender.stretches);
-    let mut sending: Vec<Span> = stretches.map(|s| Span::new(s.first, s.last)).collect();
-    sending.sort_unstable_by_key(|span| span.start);
-    let mut until = Stamp::MAX;
-    let mut found = Vec::new();
-    for span in sending {
-        if span.start.since(until) > FAR_DAYS * DAY {
-            found.push(Span::new(until, span.start));
-        }
-        until = if until == Stamp::MAX {
-            span.end
-        } else {
-            until.max(span.end)
-        };
-    }
-    found
+    let sending = stretches.map(|s| Span::new(s.first, s.last)).collect();
+    let runs = Span::joined(sending, FAR_DAYS * DAY);
+    let jumps = runs
+        .windows(2)
+        .map(|pair| Span::new(pair[0].end, pair[1].start));
+    jumps.collect()
 }
 
 /// The gaps of senders that rarely have any, sorted.

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use crate::base::error::Result;
-use crate::base::ids::Few;
+use crate::base::ids::{Few, grouped};
 use crate::base::name::role;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::{Recorded, spool_error};
@@ -73,7 +73,7 @@ pub(crate) struct Record {
     /// Whether it is silent without a message in the window.
     needs_messages: bool,
     /// The times at which it was silent although it existed; `None` for a silence to the end.
-    silences: Vec<Silence>,
+    pub(crate) silences: Vec<Silence>,
 }
 
 impl Record {
@@ -97,11 +97,6 @@ impl Record {
             needs_messages: false,
             silences: Vec::new(),
         }
-    }
-
-    /// The times at which it was silent although it existed; `None` for a silence to the end.
-    pub(crate) fn silences(&self) -> &[Silence] {
-        &self.silences
     }
 
     /// The intervals in which it exists, half-open.
@@ -223,14 +218,10 @@ fn roomy(liveness_of: &LivenessOf) -> History {
 
 /// The messages that each node sends, without latched ones.
 fn sent(traffic: &Traffic) -> Few<Name, Vec<&TopicSender>> {
-    let mut sent: Few<Name, Vec<&TopicSender>> = Few::default();
     let senders = traffic.iter().flatten().flat_map(|of| &of.list);
-    for sender in senders.filter(|sender| !sender.latched) {
-        if let Some(node) = sender.node {
-            sent.grown(node).push(sender);
-        }
-    }
-    sent
+    let own = senders.filter(|sender| !sender.latched);
+    let own = grouped(own.filter_map(|sender| Some((sender.node?, sender))));
+    own.into_iter().collect()
 }
 
 struct Assembly<'a> {
@@ -328,17 +319,13 @@ impl Assembly<'_> {
         let unknown_publishers = self.unknown_publishers(name);
         let streams = traffic.iter().flat_map(|of| &of.streams);
         let values = &self.findings.values;
-        let mut types: Vec<_> = streams
-            .map(|s| self.findings.streams[*s].connection.type_name.clone())
-            .chain(values.types(name))
-            .filter(|name| !name.is_empty())
-            .collect();
-        types.sort_unstable();
-        types.dedup();
+        let types = streams.map(|s| self.findings.streams[*s].connection.type_name.clone());
+        let types = types.chain(values.types(name));
+        let types: BTreeSet<Arc<str>> = types.filter(|name| !name.is_empty()).collect();
         let all = &mut self.history;
         let id = all.elements.topics.push(Topic {
             name: self.findings.text(name).into(),
-            types,
+            types: types.into_iter().collect(),
             seen: seen(liveness),
             qos: values.quality(name),
             unknown_publishers,
@@ -414,7 +401,7 @@ fn seen(liveness: &Liveness) -> Existence {
 }
 
 fn spans(liveness: &Liveness) -> Vec<Span> {
-    let span = |life: &Lifetime| Span::new(life.from(), life.to().plus(1));
+    let span = |life: &Lifetime| Span::new(life.from, life.to.plus(1));
     liveness.lives.iter().map(span).collect()
 }
 

@@ -51,31 +51,33 @@ struct Own<'a> {
     streams: Vec<usize>,
 }
 
-/// What a stream shows about a gap in another one.
-enum Pace {
-    /// Nothing: it is too slow, or has no messages on both sides.
-    None,
-    /// Its usual interval is so short that it cannot contain the gap.
-    Fast,
-    /// It has messages on both sides, and perhaps between them.
-    Slow,
-}
-
 impl Own<'_> {
-    /// What this stream shows about a gap.
-    fn pace(&self, (from, to): (Stamp, Stamp)) -> Pace {
+    /// Whether this stream shows that its node was there in a gap of another one. `times` are those of its messages, read on
+    /// demand, and only if they are few.
+    fn goes_on(
+        &self,
+        (from, to): (Stamp, Stamp),
+        recorded: &Recorded,
+        times: &mut Option<Vec<Stamp>>,
+    ) -> io::Result<bool> {
         let middle = middle((from, to));
         let spans = |s: &&Stretch| s.first < middle && middle < s.last;
-        let mut spanning = self.sender.stretches.iter().filter(spans);
-        let Some(period) = spanning.next().map(|s| s.period) else {
-            return Pace::None;
-        };
-        let is_below = |times: i64| period.saturating_mul(times) < to.since(from);
-        match () {
-            () if is_below(GAP * GAP) => Pace::Fast,
-            () if is_below(GAP) => Pace::Slow,
-            () => Pace::None,
+        let period = self.sender.stretches.iter().find(spans).map(|s| s.period);
+        let is_below =
+            |times: i64| period.is_some_and(|p| p.saturating_mul(times) < to.since(from));
+        // Its usual interval is so short that it cannot contain the gap.
+        let is_fast = is_below(GAP * GAP);
+        // It shows nothing if it is too slow, or has no messages on both sides.
+        if is_fast || !is_below(GAP) {
+            return Ok(is_fast);
         }
+        if times.is_none() {
+            *times = Some(self.times(recorded)?);
+        }
+        Ok(is_in_middle(
+            times.as_deref().unwrap_or_default(),
+            (from, to),
+        ))
     }
 
     /// Whether a rhythm ends at the one time and another begins at the other, as far as their intervals show.
@@ -128,21 +130,10 @@ fn gaps(recorded: &Recorded, own: &[Own<'_>]) -> io::Result<BTreeSet<(Stamp, Sta
     let steady = own.iter().filter(|own| !own.sender.latched);
     let mut gaps: BTreeSet<_> = steady.flat_map(|own| own.sender.gaps()).collect();
     for one in own {
-        // Read on demand, and only for streams with few messages.
         let mut times = None;
         let mut open = BTreeSet::new();
         for gap in gaps {
-            let went_on = match one.pace(gap) {
-                Pace::None => false,
-                Pace::Fast => true,
-                Pace::Slow => {
-                    if times.is_none() {
-                        times = Some(one.times(recorded)?);
-                    }
-                    is_in_middle(times.as_deref().unwrap_or_default(), gap)
-                }
-            };
-            if !went_on {
+            if !one.goes_on(gap, recorded, &mut times)? {
                 open.insert(gap);
             }
         }
@@ -160,12 +151,6 @@ fn is_in_middle(times: &[Stamp], (from, to): (Stamp, Stamp)) -> bool {
 
 fn middle((from, to): (Stamp, Stamp)) -> Stamp {
     from.plus(to.since(from) / 2)
-}
-
-/// The last message of a stream before the middle of a gap, and the first one after it.
-fn around(times: &[Stamp], gap: (Stamp, Stamp)) -> Option<(Stamp, Stamp)> {
-    let next = times.partition_point(|time| *time <= middle(gap));
-    Some((*times.get(next.checked_sub(1)?)?, *times.get(next)?))
 }
 
 /// A message: its time and the index of its stream.
@@ -262,8 +247,7 @@ pub(crate) fn restarts(
         if breaks.is_empty() {
             continue;
         }
-        let streams = own.iter().flat_map(|own| &own.streams);
-        let times = streams.map(|at| recorded.messages.times(recorded.streams[*at].times));
+        let times = own.iter().map(|own| own.times(recorded));
         let mut signs = times.collect::<io::Result<Vec<_>>>()?.concat();
         let inferences = said.of(node).iter();
         signs.extend(inferences.copied().flat_map(signs_of));
@@ -290,11 +274,12 @@ pub(crate) fn restarts(
 /// Whether a process continues to number its log records across a gap in its other messages, so that it did
 /// not end.
 fn counts_on(recorded: &Recorded, log: &Own<'_>, gap: (Stamp, Stamp)) -> bool {
-    log.streams.iter().any(|at| {
-        let times = recorded.messages.times(recorded.streams[*at].times);
-        let around = times.ok().and_then(|times| around(&times, gap));
-        let both = around.zip(recorded.numbers.some(*at));
-        both.is_some_and(|((from, to), numbers)| numbers.count_on(from, to))
+    // An error of reading recurs.
+    let streams = numbered(recorded, log).unwrap_or_default();
+    streams.iter().any(|stream| {
+        let around = around_all(std::slice::from_ref(stream), gap);
+        let both = around.zip(recorded.numbers.some(stream.0));
+        both.is_some_and(|((from, to), numbers)| numbers.count_on(from.0, to.0))
     })
 }
 
@@ -340,12 +325,9 @@ fn falls_of(
         let is_quick = |from: Place, to: Place| {
             let numbers = recorded.numbers.some(from.1);
             let is_high = |numbers: &Numbers| {
-                let before = numbers
-                    .at(from.0)
-                    .is_some_and(|before| before.number > BEGUN_LONG);
-                before
-                    && numbers
-                        .is_one_counter(recorded.messages.count(recorded.streams[from.1].times))
+                let many = recorded.messages.count(recorded.streams[from.1].times);
+                let has_begun = |before: Number| before.number > BEGUN_LONG;
+                numbers.at(from.0).is_some_and(has_begun) && numbers.is_one_counter(many)
             };
             to.0.since(from.0) < GAP_NS && from.1 == to.1 && numbers.is_some_and(is_high)
         };
@@ -441,13 +423,11 @@ fn declared(recorded: &Recorded, said: &Few<Name, Vec<&Inference>>) -> io::Resul
 
 /// All statements about each node.
 fn said(inferences: &[Inference]) -> Few<Name, Vec<&Inference>> {
-    let mut of: Few<Name, Vec<&Inference>> = Few::default();
-    for inference in inferences {
-        if let [Some(node), _] = inference.what.ends() {
-            of.grown(node).push(inference);
-        }
-    }
-    of
+    let nodes = inferences.iter().filter_map(|inference| {
+        let [node, _] = inference.what.ends();
+        Some((node?, inference))
+    });
+    grouped(nodes).into_iter().collect()
 }
 
 /// The times of a statement.

@@ -41,11 +41,8 @@ impl Senders {
         self.streams.binary_search(&stream).ok()
     }
 
-    /// Whether a stream has no messages while others of its sender have.
-    pub(crate) fn is_empty_among_others(&self, stream: usize) -> bool {
-        let Some(place) = self.place(stream) else {
-            return false;
-        };
+    /// Whether the stream at a place has no messages while others of its sender have.
+    pub(crate) fn is_empty_among_others(&self, place: usize) -> bool {
         let mut all = self.of.iter().zip(&self.traces);
         let has_messages = all.any(|(of, trace)| *of == self.of[place] && trace.is_some());
         self.traces[place].is_none() && has_messages

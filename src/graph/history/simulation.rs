@@ -1,9 +1,10 @@
 //! Simulated time: where it was set back, stood still, or had another speed than the recorder's clock. For example, `/clock` counts to
 //! 104 s, is silent for 6 s and goes on at 104.01 s: the simulation was paused. If it goes on at 110 s, the recorder was.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::io;
 
+use crate::base::ids::grouped;
 use crate::base::rhythm::{
     CLOSE_NS, GAP, GAP_NS, SAME_STEP, SPEED_FEWEST, SPEED_HOLDS_NS, SPEED_NS, SPEED_SHARE,
     TOGETHER_NS,
@@ -42,14 +43,11 @@ pub(crate) struct Simulation {
 /// If the temporary file of times cannot be read.
 pub(crate) fn simulation(recorded: &Recorded, traffic: &Traffic) -> io::Result<Simulation> {
     // One clock, possibly in the parts of a recording; of several, the one with the most messages.
-    let mut clocks: BTreeMap<_, Vec<SeriesId>> = BTreeMap::new();
-    for (at, series) in recorded.facts.clocks.somes() {
+    let clocks = recorded.facts.clocks.somes().map(|(at, series)| {
         let stream = &recorded.streams[at];
-        clocks
-            .entry((stream.topic, stream.publisher))
-            .or_default()
-            .push(*series);
-    }
+        ((stream.topic, stream.publisher), *series)
+    });
+    let clocks = grouped(clocks);
     let times = &recorded.facts.times;
     let many = |of: &&Vec<SeriesId>| of.iter().map(|series| times.count(*series)).sum::<u64>();
     let Some(clock) = clocks.values().max_by_key(many) else {
@@ -199,26 +197,22 @@ fn speeds_of_rates(traffic: &Traffic) -> Vec<(Span, f64)> {
     let senders = traffic.iter().flatten().flat_map(|of| &of.list);
     let senders: Vec<_> = senders.filter(|s| !s.latched).collect();
     let mut steps: Vec<RateStep> = Vec::new();
-    for (sender, pair) in senders
-        .iter()
-        .flat_map(|s| s.stretches.windows(2).map(move |pair| (s, pair)))
-    {
-        if pair[1].is_joined && pair.iter().all(Stretch::has_rate) {
-            steps.push(RateStep {
-                at: pair[1].first,
-                factor: pair[1].hz() / pair[0].hz(),
-                node: sender.node,
-            });
+    for sender in &senders {
+        for pair in sender.stretches.windows(2) {
+            if pair[1].is_joined && pair.iter().all(Stretch::has_rate) {
+                steps.push(RateStep {
+                    at: pair[1].first,
+                    factor: pair[1].hz() / pair[0].hz(),
+                    node: sender.node,
+                });
+            }
         }
     }
     steps.sort_by_key(|step| step.at);
-    let firsts = senders.iter().filter_map(|s| s.stretches.first());
-    let lasts = senders.iter().filter_map(|s| s.stretches.last());
-    let bounds = firsts
-        .map(|s| s.first)
-        .min()
-        .zip(lasts.map(|s| s.last).max());
-    let Some((mut from, end)) = bounds else {
+    let stretches = || senders.iter().flat_map(|sender| &sender.stretches);
+    let first = stretches().map(|s| s.first).min();
+    let last = stretches().map(|s| s.last).max();
+    let Some((mut from, end)) = first.zip(last) else {
         return Vec::new();
     };
     let (mut speeds, mut speed) = (Vec::new(), 1.0);

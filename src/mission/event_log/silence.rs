@@ -11,7 +11,7 @@ use crate::base::ids::grouped;
 use crate::base::rhythm::TOGETHER_NS;
 use crate::base::time::Stamp;
 use crate::graph::history::{Bound, Sender, Silence};
-use crate::graph::{Element, NodeId, Record};
+use crate::graph::{Element, NodeId};
 
 /// Adds all silences.
 pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
@@ -75,7 +75,7 @@ fn by<'a, I: Ord>(
 /// The silences of an element.
 fn silences<'a>(context: &LogInput<'a>, what: Element) -> &'a [Silence] {
     let record = context.history.records.of(what);
-    record.map_or(&[], Record::silences)
+    record.map_or(&[], |record| &record.silences)
 }
 
 fn event(
