@@ -41,10 +41,18 @@ pub(crate) fn conclude(known: &mut Conclusions<'_>) {
 // Quality of service that ROS 2 recordings keep per topic (`offered_qos_profiles`): publishers at record time, and
 // whether messages stay valid after their time (`transient_local`).
 
+/// The quality of service that one publisher offers.
+#[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Offer {
+    reliability: &'static str,
+    durability: &'static str,
+    history: String,
+}
+
 /// Whether a topic's messages are kept for late subscribers.
 pub(crate) fn is_transient_local(text: &str) -> bool {
     let offers = offers(text);
-    !offers.is_empty() && offers.iter().all(|one| one.contains(" transient_local "))
+    !offers.is_empty() && offers.iter().all(|o| o.durability == "transient_local")
 }
 
 /// Keeps the topic's quality of service in short words: `reliable transient_local depth 1`.
@@ -57,9 +65,18 @@ pub(crate) fn announced(context: &mut SourceContext<'_>) {
     if let Ok(count @ 1..) = u32::try_from(offers.len()) {
         *context.facts.offers.grown(context.place) = count;
     }
-    let same = offers.chunk_by(|a, b| a == b).map(|same| match same {
-        [one] => one.clone(),
-        _ => format!("{} × {}", same.len(), same[0]),
+    let same = offers.chunk_by(|a, b| a == b).map(|same| {
+        let times = if same.len() > 1 {
+            format!("{} × ", same.len())
+        } else {
+            String::new()
+        };
+        let Offer {
+            reliability,
+            durability,
+            history,
+        } = &same[0];
+        format!("{times}{reliability} {durability} {history}")
     });
     let words = same.collect::<Vec<_>>().join(", ");
     if !words.is_empty() {
@@ -80,16 +97,16 @@ pub(crate) fn conclude_offers(known: &mut Conclusions<'_>) {
     }
 }
 
-/// The quality of service that each publisher offers according to a text of YAML; empty if it is not a list of offers.
-fn offers(text: &str) -> Vec<String> {
+/// The offers in a text of YAML; empty if it is not a list of them.
+fn offers(text: &str) -> Vec<Offer> {
     match yaml::parse(text) {
         Ok(Value::Array(list)) => list.iter().filter_map(offer).collect(),
         _ => Vec::new(),
     }
 }
 
-/// One offer: reliability, durability, history. Values are words since rosbag2 version 9, before that numbers of rmw.
-fn offer(value: &Value) -> Option<String> {
+/// One offer; values are words since rosbag2 version 9, before that numbers of rmw.
+fn offer(value: &Value) -> Option<Offer> {
     let value = value.as_object()?;
     let word = |key, words: [&'static str; 5]| match value.get(key) {
         Some(Value::Number(n)) => n
@@ -116,11 +133,13 @@ fn offer(value: &Value) -> Option<String> {
     ];
     let history = ["system_default", "keep_last", "keep_all", unknown, unknown];
     let depth = value.get("depth").and_then(Value::as_u64).unwrap_or(0);
-    let reliability = word("reliability", reliability)?;
-    let durability = word("durability", durability)?;
-    Some(match word("history", history)? {
-        "keep_last" => format!("{reliability} {durability} depth {depth}"),
-        other => format!("{reliability} {durability} {other}"),
+    Some(Offer {
+        reliability: word("reliability", reliability)?,
+        durability: word("durability", durability)?,
+        history: match word("history", history)? {
+            "keep_last" => format!("depth {depth}"),
+            other => other.to_owned(),
+        },
     })
 }
 
@@ -134,7 +153,7 @@ mod tests {
         let words = "- history: keep_last\n  depth: 10\n  reliability: reliable\n  durability: transient_local\n";
         assert_eq!(offers(numbers), offers(words));
         assert!(is_transient_local(numbers));
-        assert_eq!(offers(numbers)[0], "reliable transient_local depth 10");
+        assert_eq!(offers(numbers)[0].history, "depth 10");
     }
 
     #[test]

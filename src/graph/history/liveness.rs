@@ -58,11 +58,11 @@ pub(crate) fn collect(
                 let Some(senders) = traffic.some(stream.topic) else {
                     continue;
                 };
-                let place = senders.place(*at).unwrap_or(0);
                 // The messages of its sender may all be in another bag.
-                if senders.is_empty_among_others(place) {
+                if senders.is_empty_among_others(*at) {
                     continue;
                 }
+                let place = senders.place(*at).unwrap_or(0);
                 let (with_start, with_end) = with_input(Some(stream.topic));
                 let name = stream.connection.topic.as_str();
                 let is_free = is_log(name) || is_feedback(name);

@@ -41,8 +41,11 @@ impl Senders {
         self.streams.binary_search(&stream).ok()
     }
 
-    /// Whether the stream at a place has no messages while others of its sender have.
-    pub(crate) fn is_empty_among_others(&self, place: usize) -> bool {
+    /// Whether a stream has no messages while others of its sender have.
+    pub(crate) fn is_empty_among_others(&self, stream: usize) -> bool {
+        let Some(place) = self.place(stream) else {
+            return false;
+        };
         let mut all = self.of.iter().zip(&self.traces);
         let has_messages = all.any(|(of, trace)| *of == self.of[place] && trace.is_some());
         self.traces[place].is_none() && has_messages
