@@ -13,7 +13,6 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-use foldhash::HashSet;
 use index::Query;
 
 use crate::bag::adapters::{Bounds, Clip, GROUP, in_order};
@@ -500,7 +499,7 @@ pub(crate) struct Tail<G> {
     pub(crate) plan: ChunkPlan,
     pub(crate) grammar: G,
     /// The numbers of the connections that chunks are stated to contain.
-    used: HashSet<u32>,
+    used: BTreeSet<u32>,
 }
 
 impl<G: Grammar> Tail<G> {

@@ -150,7 +150,6 @@ pub(crate) fn conclude(known: &mut Conclusions<'_>) {
     }
 }
 
-// A topic's full name, from the form in a node's log text.
 // Two nodes of one name: rcl, where both log over one publisher, and the master of ROS 1, which ends the older one.
 
 pub(crate) fn read_duplicates(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
