@@ -7,7 +7,7 @@ use crate::architecture;
 use crate::options;
 
 /// Lines of `src` that are neither blank nor comment nor test.
-const MOST_LINES: usize = 67_446;
+const MOST_LINES: usize = 67_445;
 /// Entries of the dependency sections in `Cargo.toml`, optional ones included, those of tests not.
 const MOST_DEPENDENCIES: usize = 44;
 /// Options in the help of all commands; one that three commands have counts three times.
