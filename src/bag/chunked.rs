@@ -498,8 +498,8 @@ impl Unindexed {
 pub(crate) struct Tail<G> {
     pub(crate) plan: ChunkPlan,
     pub(crate) grammar: G,
-    /// The numbers of the connections that chunks are stated to contain.
-    used: BTreeSet<u32>,
+    /// The numbers of connections that chunks are stated to contain, but that were not described before.
+    undescribed: BTreeSet<u32>,
 }
 
 impl<G: Grammar> Tail<G> {
@@ -533,8 +533,8 @@ impl<G: Grammar> Tail<G> {
             let mut sum = IndexSum::default();
             for (raw, count) in counts {
                 sum.add(raw, count);
-                if count > 0 {
-                    self.used.insert(raw);
+                if count > 0 && self.plan.connections.get(raw).is_none() {
+                    self.undescribed.insert(raw);
                 }
             }
             sum
@@ -560,8 +560,8 @@ impl<G: Grammar> Tail<G> {
     /// Checks that all connections are described of which chunks are stated to contain messages. If not, the chunks themselves
     /// may describe the others.
     pub(crate) fn is_described(&self) -> Result<(), Unindexed> {
-        let mut used = self.used.iter();
-        if used.all(|raw| self.plan.connections.get(*raw).is_some()) {
+        let mut numbers = self.undescribed.iter();
+        if numbers.all(|raw| self.plan.connections.get(*raw).is_some()) {
             return Ok(());
         }
         Unindexed::wrong("its index counts messages of undescribed connections")
